@@ -1,0 +1,1 @@
+"""The numerical core: RGB-D frames in, fitted bodies out; no ROS, no prints, no clocks."""

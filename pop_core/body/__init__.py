@@ -1,0 +1,1 @@
+"""The parametric body: joints, model files, kinematics, skinning."""

@@ -1,0 +1,110 @@
+"""Forward kinematics of the body tree: joint positions, orientations and their Jacobian."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from pop_core.body import skinning_kernels as kernels
+from pop_core.body.model import AttachedPoints, BodyModel, BodyParameters, joint_points
+from pop_core.geometry.rotation import to_rotvec
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PosedSkeleton:
+    """The tree after shaping and posing, before scale and translation.
+
+    Args:
+        R_local: Rotation of each joint relative to its parent.
+        rest_joints: Joints of the shaped body in T-pose [m].
+        G: Rotation of each joint relative to the outer frame.
+        p: Joint positions [m], root at its rest place.
+    """
+
+    R_local: Float[np.ndarray, '24 3 3']
+    rest_joints: Float[np.ndarray, '24 3']
+    G: Float[np.ndarray, '24 3 3']
+    p: Float[np.ndarray, '24 3']
+
+
+def pose_skeleton(model: BodyModel, parameters: BodyParameters) -> PosedSkeleton:
+    """Return the posed tree of a body."""
+    rotvecs = np.vstack([parameters.global_orient, parameters.body_pose])
+    R_local = kernels.rotation_matrices(rotvecs)
+    rest_joints = model.joint_template + model.joint_shapedirs @ parameters.betas
+    G, p = kernels.forward_kinematics(R_local, rest_joints, model.parents)
+    return PosedSkeleton(R_local, rest_joints, G, p)
+
+
+def joints(model: BodyModel, parameters: BodyParameters) -> Float[np.ndarray, '24 3']:
+    """Return the 24 joints [m] in the parameters' outer frame."""
+    skeleton = pose_skeleton(model, parameters)
+    return parameters.scale * skeleton.p + parameters.transl
+
+
+def joint_rotations(model: BodyModel, parameters: BodyParameters) -> Float[np.ndarray, '24 3 3']:
+    """Return the orientation of each joint's frame in the parameters' outer frame."""
+    return pose_skeleton(model, parameters).G
+
+
+def attached_positions(
+    points: AttachedPoints, model: BodyModel, parameters: BodyParameters
+) -> Float[np.ndarray, 'n 3']:
+    """Return points carried by joints [m] in the parameters' outer frame."""
+    skeleton = pose_skeleton(model, parameters)
+    return parameters.scale * _posed(points, skeleton, parameters.betas) + parameters.transl
+
+
+def attached_jacobian(
+    points: AttachedPoints, model: BodyModel, parameters: BodyParameters, skeleton: PosedSkeleton
+) -> Float[np.ndarray, 'n 3 x']:
+    """Return d(position)/d(transl, rotation increments, betas, log scale) of attached points."""
+    n, n_betas = len(points.joint), model.n_betas
+    posed = _posed(points, skeleton, parameters.betas)
+    _, e = kernels.joint_shape_derivatives(skeleton.G, model.joint_shapedirs, model.parents)
+    out = np.zeros((n, 3, 3 + 72 + n_betas + 1))
+    out[:, :, :3] = np.eye(3)
+    for i, carrier in enumerate(points.joint):
+        j = int(carrier)
+        shape = skeleton.G[j] @ points.shapedirs[i] + e[j]
+        out[i, :, 75: 75 + n_betas] = parameters.scale * shape
+        while j >= 0:
+            parent = int(model.parents[j])
+            axes = skeleton.G[parent] if parent >= 0 else np.eye(3)
+            lever = parameters.scale * (posed[i] - skeleton.p[j])
+            out[i, :, 3 + 3 * j: 6 + 3 * j] = np.cross(axes.T, lever).T
+            j = parent
+    out[:, :, -1] = parameters.scale * posed
+    return out
+
+
+def joints_jacobian(
+    model: BodyModel, parameters: BodyParameters, skeleton: PosedSkeleton
+) -> Float[np.ndarray, '24 3 x']:
+    """Return d(joints)/d(transl, rotation increments, betas, log scale)."""
+    return attached_jacobian(joint_points(model), model, parameters, skeleton)
+
+
+def increment(
+    parameters: BodyParameters, step: Float[np.ndarray, 'x'], skeleton: PosedSkeleton
+) -> BodyParameters:
+    """Return parameters moved by a step, rotations turned from the left in their parent's frame."""
+    turned = kernels.rotation_matrices(step[3:75].reshape(24, 3)) @ skeleton.R_local
+    rotvecs = to_rotvec(turned)
+    return BodyParameters(
+        transl=parameters.transl + step[:3],
+        global_orient=rotvecs[0],
+        body_pose=rotvecs[1:],
+        betas=parameters.betas + step[75:-1],
+        scale=float(parameters.scale * np.exp(step[-1])),
+    )
+
+
+def _posed(
+    points: AttachedPoints, skeleton: PosedSkeleton, betas: Float[np.ndarray, 'b']
+) -> Float[np.ndarray, 'n 3']:
+    rest = points.template + points.shapedirs @ betas
+    arm = rest - skeleton.rest_joints[points.joint]
+    return skeleton.p[points.joint] + np.einsum('nrc,nc->nr', skeleton.G[points.joint], arm)

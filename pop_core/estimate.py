@@ -1,0 +1,78 @@
+"""The result for one person of one frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum, IntEnum
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pop_core.body.model import BodyParameters
+
+
+class JointState(IntEnum):
+    """How much of a joint the camera sees, from geometry."""
+
+    VISIBLE = 0
+    SELF_OCCLUDED = 1
+    SCENE_OCCLUDED = 2
+    OUT_OF_IMAGE = 3
+    UNKNOWN = 4
+
+
+class EstimateStatus(Enum):
+    """What became of one detected person; a bad frame is data, not an exception."""
+
+    OK = 'fitted'
+    TOO_FEW_JOINTS = (
+        'fewer lifted joints than min_joints: move closer or check the depth registration'
+    )
+    TOO_FAR = 'beyond max_range_m'
+    NO_SUPPORT = 'the fitted body does not explain the depth of its pixels: probably no person'
+    DUPLICATE = 'the same person as a better detection'
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyEstimate:
+    """One fitted person.
+
+    Args:
+        parameters: SMPL parameters in the camera frame.
+        vertices: Mesh [m], camera frame.
+        joints: The 24 joints [m], camera frame.
+        joint_rotations: Orientation of each joint's frame in the camera frame.
+        joint_state: A JointState per joint.
+        joint_covariance: Covariance of each joint's position [m^2].
+        mask: Pixels of the frame that show this person (the paper's H).
+        score: Confidence 0..1 that this is a person fitted right.
+        energies: Final energies by name.
+        runners_up: Parameters of the other hypotheses, best first.
+    """
+
+    parameters: BodyParameters
+    vertices: Float[np.ndarray, 'v 3']
+    joints: Float[np.ndarray, '24 3']
+    joint_rotations: Float[np.ndarray, '24 3 3']
+    joint_state: Int[np.ndarray, '24']
+    joint_covariance: Float[np.ndarray, '24 3 3']
+    mask: Bool[np.ndarray, 'h w']
+    score: float
+    energies: Mapping[str, float] = field(default_factory=dict)
+    runners_up: tuple[BodyParameters, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameResult:
+    """Everything the pipeline has to say about one frame.
+
+    Args:
+        bodies: Fitted people, nearest first.
+        statuses: One status per detection, in the detector's order.
+        times_ms: Wall time per step [ms].
+    """
+
+    bodies: tuple[BodyEstimate, ...]
+    statuses: tuple[EstimateStatus, ...]
+    times_ms: Mapping[str, float]

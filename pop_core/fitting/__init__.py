@@ -1,0 +1,1 @@
+"""Fitting the body to the scene (steps 5, 7 and 8 of the paper)."""

@@ -1,0 +1,141 @@
+"""Pinhole camera with lens distortion: points of the camera frame [m] to pixels and back.
+
+Pixel centres are integers. Models are those of ROS CameraInfo (REP 104): plumb_bob (Brown 1971),
+rational_polynomial and equidistant (Kannala and Brandt 2006).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+
+from pop_core.errors import CameraError
+
+DISTORTION_LENGTHS = {
+    '': (0,),
+    'plumb_bob': (0, 4, 5),
+    'rational_polynomial': (0, 8, 12, 14),
+    'equidistant': (0, 4),
+}
+
+
+def _no_distortion() -> Float[np.ndarray, 'd']:
+    return np.zeros(0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Camera:
+    """Intrinsics of one camera.
+
+    Args:
+        width: Image width [px].
+        height: Image height [px].
+        fx: Focal length along u [px].
+        fy: Focal length along v [px].
+        cx: Principal point, u [px].
+        cy: Principal point, v [px].
+        distortion_model: Name as in CameraInfo; '' is a pure pinhole.
+        d: Distortion coefficients in the model's order.
+
+    Raises:
+        CameraError: If focal lengths are not positive or coefficients do not fit the model.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    distortion_model: str = ''
+    d: Float[np.ndarray, 'd'] = field(default_factory=_no_distortion)
+
+    def __post_init__(self) -> None:
+        numbers = np.array([self.fx, self.fy, self.cx, self.cy])
+        if not (np.isfinite(numbers).all() and self.fx > 0 and self.fy > 0):
+            raise CameraError(
+                f'camera: expected finite intrinsics with positive fx and fy, found fx={self.fx} '
+                f'fy={self.fy} cx={self.cx} cy={self.cy}: is the camera calibrated?'
+            )
+        if self.width <= 0 or self.height <= 0:
+            raise CameraError(
+                f'camera: expected a positive size, found {self.width}x{self.height}'
+            )
+        allowed = DISTORTION_LENGTHS.get(self.distortion_model)
+        if allowed is None or self.d.size not in allowed or not np.isfinite(self.d).all():
+            raise CameraError(
+                f'camera: expected one of {list(DISTORTION_LENGTHS)} with finite coefficients, '
+                f'found {self.distortion_model!r} with d={self.d.tolist()}'
+            )
+
+    @property
+    def K(self) -> Float[np.ndarray, '3 3']:  # noqa: N802 - the field's word
+        """Return the 3x3 matrix of intrinsics [px]."""
+        return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1.0]])
+
+    @property
+    def is_distorted(self) -> bool:
+        """Return whether any distortion coefficient differs from zero."""
+        return bool(np.any(self.d))
+
+    def project(self, p_camera: Float[np.ndarray, 'n 3']) -> Float[np.ndarray, 'n 2']:
+        """Return pixels of points in the camera frame [m]; points with z <= 0 give NaN."""
+        p_camera = np.asarray(p_camera, dtype=np.float64)
+        in_front = p_camera[:, 2] > 0
+        safe = np.where(in_front[:, None], p_camera, [0.0, 0.0, 1.0])
+        if self.is_distorted:
+            uv = self._project_distorted(safe)
+        else:
+            uv = safe[:, :2] / safe[:, 2:] * [self.fx, self.fy] + [self.cx, self.cy]
+        return np.where(in_front[:, None], uv, np.nan)
+
+    def unproject(
+        self, uv: Float[np.ndarray, 'n 2'], depth_m: Float[np.ndarray, 'n']
+    ) -> Float[np.ndarray, 'n 3']:
+        """Return points of the camera frame [m] of pixels with depth along z [m]."""
+        uv = np.asarray(uv, dtype=np.float64)
+        if self.is_distorted:
+            xy = self._undistort(uv)
+        else:
+            xy = (uv - [self.cx, self.cy]) / [self.fx, self.fy]
+        return np.column_stack([xy * depth_m[:, None], depth_m])
+
+    def ray_grid(self) -> Float[np.ndarray, 'h w 2']:
+        """Return (x/z, y/z) of every pixel: multiply by depth [m] for points."""
+        v, u = np.mgrid[: self.height, : self.width]
+        uv = np.column_stack([u.ravel(), v.ravel()]).astype(np.float64)
+        rays = self.unproject(uv, np.ones(len(uv)))
+        return rays[:, :2].reshape(self.height, self.width, 2)
+
+    def resized(self, factor: float) -> Camera:
+        """Return the camera of the image resized by `factor` (centres: u' = (u+0.5)s - 0.5)."""
+        return Camera(
+            round(self.width * factor), round(self.height * factor),
+            self.fx * factor, self.fy * factor,
+            (self.cx + 0.5) * factor - 0.5, (self.cy + 0.5) * factor - 0.5,
+            self.distortion_model, self.d,
+        )
+
+    def without_distortion(self) -> Camera:
+        """Return the pure pinhole of the same intrinsics."""
+        return Camera(self.width, self.height, self.fx, self.fy, self.cx, self.cy)
+
+    def _project_distorted(self, p: Float[np.ndarray, 'n 3']) -> Float[np.ndarray, 'n 2']:
+        zero = np.zeros(3)
+        if self.distortion_model == 'equidistant':
+            uv, _ = cv2.fisheye.projectPoints(p[:, None], zero, zero, self.K, self.d)
+        else:
+            uv, _ = cv2.projectPoints(p[:, None], zero, zero, self.K, self.d)
+        return uv[:, 0]
+
+    def _undistort(self, uv: Float[np.ndarray, 'n 2']) -> Float[np.ndarray, 'n 2']:
+        if len(uv) == 0:
+            return uv
+        if self.distortion_model == 'equidistant':
+            return cv2.fisheye.undistortPoints(uv[:, None], self.K, self.d)[:, 0]
+        # The default 5 iterations leave 0.1 px at the corners of wide lenses.
+        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-8)
+        return cv2.undistortPointsIter(uv[:, None], self.K, self.d, None, None, criteria)[:, 0]

@@ -1,0 +1,1 @@
+"""2D keypoints of people and their lifting to 3D."""

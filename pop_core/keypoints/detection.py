@@ -1,0 +1,50 @@
+"""What a keypoint source says about one person in one image, and the protocol of all sources."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Bool, Float, Int8
+
+from pop_core.rgbd import RgbdFrame
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Detection:
+    """One person in one image.
+
+    Args:
+        keypoints_px: Pixels (u, v) of the 15 shared joints; NaN where not detected.
+        scores: Confidence 0..1 of each; 0 where not detected.
+        box_px: Bounding box (left, top, right, bottom) of the person.
+        joint_depth_m: Metric depth of each joint itself (not of the skin), NaN where unknown;
+            None from sources that see no depth.
+        joint_sigma_m: Standard deviation of `joint_depth_m` [m].
+        visible: Probability that each joint is seen, not hidden; None when the source cannot say.
+        person_mask: Pixels of this person, or None.
+        part_labels: Joint index (0..23) of the body part at each pixel, -1 elsewhere, or None.
+    """
+
+    keypoints_px: Float[np.ndarray, 's 2']
+    scores: Float[np.ndarray, 's']
+    box_px: Float[np.ndarray, '4']
+    joint_depth_m: Float[np.ndarray, 's'] | None = None
+    joint_sigma_m: Float[np.ndarray, 's'] | None = None
+    visible: Float[np.ndarray, 's'] | None = None
+    person_mask: Bool[np.ndarray, 'h w'] | None = None
+    part_labels: Int8[np.ndarray, 'h w'] | None = None
+
+    @property
+    def score(self) -> float:
+        """Return the mean confidence over the 15 shared joints, undetected ones counting zero."""
+        return float(self.scores.mean())
+
+
+class KeypointDetector(Protocol):
+    """Anything that finds people in a frame."""
+
+    def detect(self, frame: RgbdFrame) -> list[Detection]:
+        """Return the people of a frame, best first; an empty list when there are none."""
+        ...

@@ -1,0 +1,43 @@
+"""Keypoints with depth: the input of retrieval and of the joint term of the fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+
+class LiftState(IntEnum):
+    """What became of a keypoint when it was lifted."""
+
+    VISIBLE = 0
+    OCCLUDED = 1
+    OUTLIER = 2
+    MISSING = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LiftedJoints:
+    """The shared joints of one person in 3D.
+
+    Args:
+        positions_camera: Joint centres (not skin) in the camera frame [m]; NaN unless lifted.
+        sigma_m: Standard deviation of each position [m]; inf unless lifted.
+        state: A LiftState per joint.
+        keypoints_px: The pixels they came from; kept for occluded joints too, whose direction
+            is known although their depth is not. NaN where nothing was detected.
+        scores: Detector confidence 0..1 of each keypoint.
+    """
+
+    positions_camera: Float[np.ndarray, 's 3']
+    sigma_m: Float[np.ndarray, 's']
+    state: Int[np.ndarray, 's']
+    keypoints_px: Float[np.ndarray, 's 2']
+    scores: Float[np.ndarray, 's']
+
+    @property
+    def lifted(self) -> Bool[np.ndarray, 's']:
+        """Return which joints have a position."""
+        return np.isfinite(self.positions_camera).all(axis=1)

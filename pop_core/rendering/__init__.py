@@ -1,0 +1,1 @@
+"""Depth rendering of meshes and pictures of results."""

@@ -1,0 +1,49 @@
+"""Numba z-buffer (float32 depth, one thread, no GIL)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+NEAR_M = 0.05
+
+
+@njit(cache=True, nogil=True)
+def rasterize(vertices, faces, fx, fy, cx, cy, depth, face_id):
+    """Draw triangles of the camera frame [m] into depth (h,w, +inf = nothing) and face ids.
+
+    Pixel centres are integers. 1/z is linear over the image of a triangle, so depth is exact.
+    Triangles that touch the near plane are left out.
+    """
+    h, w = depth.shape
+    n = vertices.shape[0]
+    u = np.empty(n)
+    v = np.empty(n)
+    inverse = np.empty(n)
+    for i in range(n):
+        z = vertices[i, 2]
+        inverse[i] = 1.0 / z if z > NEAR_M else 0.0
+        u[i] = fx * vertices[i, 0] * inverse[i] + cx
+        v[i] = fy * vertices[i, 1] * inverse[i] + cy
+    for t in range(faces.shape[0]):
+        a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+        if inverse[a] == 0.0 or inverse[b] == 0.0 or inverse[c] == 0.0:
+            continue
+        area = (u[b] - u[a]) * (v[c] - v[a]) - (u[c] - u[a]) * (v[b] - v[a])
+        if area == 0.0:
+            continue
+        left = max(0, int(np.ceil(min(u[a], u[b], u[c]))))
+        right = min(w - 1, int(np.floor(max(u[a], u[b], u[c]))))
+        top = max(0, int(np.ceil(min(v[a], v[b], v[c]))))
+        bottom = min(h - 1, int(np.floor(max(v[a], v[b], v[c]))))
+        for y in range(top, bottom + 1):
+            for x in range(left, right + 1):
+                wb = ((x - u[a]) * (v[c] - v[a]) - (u[c] - u[a]) * (y - v[a])) / area
+                wc = ((u[b] - u[a]) * (y - v[a]) - (x - u[a]) * (v[b] - v[a])) / area
+                wa = 1.0 - wb - wc
+                if wa < 0.0 or wb < 0.0 or wc < 0.0:
+                    continue
+                z = 1.0 / (wa * inverse[a] + wb * inverse[b] + wc * inverse[c])
+                if z < depth[y, x]:
+                    depth[y, x] = z
+                    face_id[y, x] = t

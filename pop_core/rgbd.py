@@ -1,0 +1,104 @@
+"""One registered colour and depth image, and the point cloud of its pixels (step 1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Float32, UInt8
+
+from pop_core.errors import FrameError
+from pop_core.geometry.camera import Camera
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RgbdFrame:
+    """A colour image and the depth of the same pixels.
+
+    Args:
+        rgb: Colour image, RGB order.
+        depth_m: Distance along z [m] in the colour camera's frame; NaN is no measurement.
+        camera: Intrinsics of both.
+        stamp_ns: Time of the colour image [ns].
+
+    Raises:
+        FrameError: If sizes differ or any depth is not NaN and not positive and finite.
+    """
+
+    rgb: UInt8[np.ndarray, 'h w 3']
+    depth_m: Float32[np.ndarray, 'h w']
+    camera: Camera
+    stamp_ns: int = 0
+
+    def __post_init__(self) -> None:
+        size = (self.camera.height, self.camera.width)
+        if self.rgb.shape[:2] != size or self.depth_m.shape != size:
+            raise FrameError(
+                f'frame: expected colour and depth of {size[1]}x{size[0]} as the camera says, '
+                f'found colour {self.rgb.shape} and depth {self.depth_m.shape}'
+            )
+
+
+def clean_depth(depth_m: Float32[np.ndarray, 'h w']) -> Float32[np.ndarray, 'h w']:
+    """Return depth [m] in which every value that is not a distance (0, negative, inf) is NaN."""
+    with np.errstate(invalid='ignore'):
+        return np.where((depth_m > 0) & np.isfinite(depth_m), depth_m, np.float32(np.nan))
+
+
+def undistort_frame(frame: RgbdFrame) -> RgbdFrame:
+    """Return the frame as a pure pinhole of the same intrinsics sees it.
+
+    Depth is sampled by nearest neighbour: interpolation would invent points between a limb and
+    the wall behind it.
+    """
+    camera = frame.camera
+    if not camera.is_distorted:
+        return frame
+    size = (camera.width, camera.height)
+    if camera.distortion_model == 'equidistant':
+        maps = cv2.fisheye.initUndistortRectifyMap(
+            camera.K, camera.d, np.eye(3), camera.K, size, cv2.CV_32FC1)
+    else:
+        maps = cv2.initUndistortRectifyMap(
+            camera.K, camera.d, np.eye(3), camera.K, size, cv2.CV_32FC1)
+    rgb = cv2.remap(frame.rgb, *maps, cv2.INTER_LINEAR)
+    depth_m = cv2.remap(
+        frame.depth_m, *maps, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT,
+        borderValue=float('nan'))
+    return RgbdFrame(rgb, depth_m, camera.without_distortion(), frame.stamp_ns)
+
+
+def point_cloud(
+    frame: RgbdFrame, mask: Bool[np.ndarray, 'h w']
+) -> tuple[Float[np.ndarray, 'n 3'], Float[np.ndarray, 'n 2']]:
+    """Return the measured points of a mask (step 1: PC from D_in and K).
+
+    Returns:
+        Points in the camera frame [m] and their pixels (u, v), in row order.
+    """
+    v, u = np.nonzero(mask & np.isfinite(frame.depth_m))
+    uv = np.column_stack([u, v]).astype(np.float64)
+    return frame.camera.unproject(uv, frame.depth_m[v, u].astype(np.float64)), uv
+
+
+def flying_pixels(
+    depth_m: Float32[np.ndarray, 'h w'], jump_ratio: float = 0.02
+) -> Bool[np.ndarray, 'h w']:
+    """Return pixels whose depth lies between two surfaces, as sensors give at edges.
+
+    A pixel flies when a neighbour on one side is nearer and the opposite one is farther, both by
+    more than `jump_ratio` of its depth: no surface seen by a camera does that.
+    """
+    padded = np.pad(depth_m, 1, mode='edge')
+    here, jump = depth_m, depth_m * jump_ratio
+    flying = np.zeros(depth_m.shape, dtype=bool)
+    with np.errstate(invalid='ignore'):
+        for dy, dx in ((0, 1), (1, 0)):
+            h, w = depth_m.shape
+            before = padded[1 - dy: 1 - dy + h, 1 - dx: 1 - dx + w]
+            after = padded[1 + dy: 1 + dy + h, 1 + dx: 1 + dx + w]
+            rising = (before < here - jump) & (after > here + jump)
+            falling = (before > here + jump) & (after < here - jump)
+            flying |= rising | falling
+    return flying

@@ -1,0 +1,1 @@
+"""Synthetic RGB-D scenes with truth."""

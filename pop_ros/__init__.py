@@ -1,0 +1,1 @@
+"""The ROS 2 package: node, messages, replay and command line."""
