@@ -1,0 +1,171 @@
+"""Body model files: one compressed npz under SMPL's array names, read without pickle."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pop_core.body.joints import N_JOINTS
+from pop_core.body.model import BodyModel
+from pop_core.errors import ModelFileError
+
+ARRAY_NAMES = (
+    'v_template', 'shapedirs', 'J_regressor', 'weights', 'parents', 'f', 'fit_vertices',
+    'fit_faces',
+)
+# float32 sums of a few hundred terms, and files written with four decimals.
+WEIGHT_SUM_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModelNotes:
+    """What a body model file says about itself.
+
+    Args:
+        licence: Licence of the arrays, such as 'Apache-2.0'.
+        provenance: Where they come from, in sentences.
+    """
+
+    licence: str
+    provenance: str
+
+
+def load_body_model(path: Path) -> BodyModel:
+    """Read and check a body model file written by `save_body_model`.
+
+    Raises:
+        ModelFileError: If the file is missing, damaged, or its arrays do not form a body.
+    """
+    arrays = _read_arrays(path)
+    missing = [name for name in ('name', *ARRAY_NAMES) if name not in arrays]
+    if missing:
+        raise ModelFileError(
+            f'{path}: expected the arrays {", ".join(ARRAY_NAMES)}, found no {", ".join(missing)}; '
+            'convert SMPL, SMPL-H, SMPL-X and STAR files with `pop body import`'
+        )
+    posedirs = arrays.get('posedirs')
+    model = BodyModel(
+        name=str(arrays['name']),
+        v_template=_floats(arrays, 'v_template', path, 'v 3'),
+        shapedirs=_floats(arrays, 'shapedirs', path, 'v 3 b'),
+        posedirs=None if posedirs is None else _floats(arrays, 'posedirs', path, 'v 3 p'),
+        J_regressor=_floats(arrays, 'J_regressor', path, 'j v'),
+        weights=_floats(arrays, 'weights', path, 'v j'),
+        parents=_integers(arrays, 'parents', path, 'j'),
+        f=_integers(arrays, 'f', path, 'm 3'),
+        fit_vertices=_integers(arrays, 'fit_vertices', path, 'n'),
+        fit_faces=_integers(arrays, 'fit_faces', path, 'k 3'),
+    )
+    check_body_model(model, str(path))
+    return model
+
+
+def load_model_notes(path: Path) -> ModelNotes:
+    """Read licence and provenance of a body model file; empty where it states none."""
+    arrays = _read_arrays(path)
+    return ModelNotes(str(arrays.get('licence', '')), str(arrays.get('provenance', '')))
+
+
+def save_body_model(path: Path, model: BodyModel, notes: ModelNotes) -> None:
+    """Write a body model: directions as float16 (0.1 mm at 20 cm), everything else 32 bits."""
+    half, single, whole = np.float16, np.float32, np.int32
+    arrays: dict[str, np.ndarray] = {
+        'name': np.array(model.name),
+        'licence': np.array(notes.licence),
+        'provenance': np.array(notes.provenance),
+        'v_template': model.v_template.astype(single),
+        'shapedirs': model.shapedirs.astype(half),
+        'J_regressor': model.J_regressor.astype(single),
+        'weights': model.weights.astype(single),
+        'parents': model.parents.astype(whole),
+        'f': model.f.astype(whole),
+        'fit_vertices': model.fit_vertices.astype(whole),
+        'fit_faces': model.fit_faces.astype(whole),
+    }
+    if model.posedirs is not None:
+        arrays['posedirs'] = model.posedirs.astype(half)
+    with path.open('wb') as stream:
+        np.savez_compressed(stream, allow_pickle=False, **arrays)
+
+
+def check_body_model(model: BodyModel, where: str) -> None:
+    """Raise ModelFileError unless the arrays form one body that can be posed."""
+    for name in ('v_template', 'shapedirs', 'J_regressor', 'weights'):
+        _expect(bool(np.isfinite(getattr(model, name)).all()), where, f'finite {name}', 'NaN')
+    sums = model.weights.sum(axis=1)
+    worst = float(np.abs(sums - 1.0).max())
+    expected = f'weights that sum to 1 within {WEIGHT_SUM_TOLERANCE}'
+    _expect(worst <= WEIGHT_SUM_TOLERANCE, where, expected, f'a row that is off by {worst:.3g}')
+    parents = model.parents
+    is_tree = parents[0] == -1 and all(0 <= parents[j] < j for j in range(1, N_JOINTS))
+    _expect(bool(is_tree), where, 'parents before their children, root -1', str(parents.tolist()))
+    _check_faces(model.f, len(model.v_template), where, 'f')
+    _check_faces(model.fit_faces, len(model.fit_vertices), where, 'fit_faces')
+    fit = model.fit_vertices
+    inside = len(fit) > 0 and fit.min() >= 0 and fit.max() < len(model.v_template)
+    _expect(bool(inside), where, 'fit_vertices that index v_template', _range(fit))
+
+
+def _check_faces(faces: Int[np.ndarray, 'm 3'], count: int, where: str, name: str) -> None:
+    inside = len(faces) > 0 and faces.min() >= 0 and faces.max() < count
+    _expect(bool(inside), where, f'{name} that index {count} vertices', _range(faces))
+    a, b, c = faces.T
+    repeated = int(np.sum((a == b) | (b == c) | (c == a)))
+    _expect(repeated == 0, where, f'triangles in {name}', f'{repeated} that repeat a vertex')
+
+
+def _range(indices: np.ndarray) -> str:
+    return f'indices {indices.min()} to {indices.max()}' if indices.size else 'none'
+
+
+def _expect(holds: bool, where: str, expected: str, found: str) -> None:  # noqa: FBT001
+    if not holds:
+        raise ModelFileError(f'{where}: expected {expected}, found {found}')
+
+
+def _read_arrays(path: Path) -> dict[str, np.ndarray]:
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except FileNotFoundError as error:
+        raise ModelFileError(f'{path}: expected a body model file, found nothing') from error
+    except (OSError, ValueError, AttributeError, zipfile.BadZipFile) as error:
+        raise ModelFileError(
+            f'{path}: expected an npz archive of plain arrays, found {error}'
+        ) from error
+
+
+def _floats(
+    arrays: dict[str, np.ndarray], name: str, path: Path, axes: str
+) -> Float[np.ndarray, '...']:
+    array = arrays[name]
+    _check_axes(array, name, path, axes, 'numbers', 'fiu')
+    return array.astype(np.float64)
+
+
+def _integers(
+    arrays: dict[str, np.ndarray], name: str, path: Path, axes: str
+) -> Int[np.ndarray, '...']:
+    array = arrays[name]
+    _check_axes(array, name, path, axes, 'integers', 'iu')
+    return array.astype(np.int64)
+
+
+def _check_axes(
+    array: np.ndarray, name: str, path: Path, axes: str, kind_name: str, kinds: str
+) -> None:
+    fixed = {'3': 3, 'j': N_JOINTS}
+    letters = axes.split()
+    fits = len(letters) == array.ndim and all(
+        fixed.get(letter, size) == size
+        for letter, size in zip(letters, array.shape, strict=True)
+    )
+    if not fits or array.dtype.kind not in kinds:
+        raise ModelFileError(
+            f'{path}: expected {name} as {kind_name} of shape ({axes}), j = {N_JOINTS}, '
+            f'found {array.dtype} of shape {array.shape}'
+        )
