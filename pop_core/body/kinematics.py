@@ -61,22 +61,12 @@ def attached_jacobian(
     points: AttachedPoints, model: BodyModel, parameters: BodyParameters, skeleton: PosedSkeleton
 ) -> Float[np.ndarray, 'n 3 x']:
     """Return d(position)/d(transl, rotation increments, betas, log scale) of attached points."""
-    n, n_betas = len(points.joint), model.n_betas
-    posed = _posed(points, skeleton, parameters.betas)
     _, e = kernels.joint_shape_derivatives(skeleton.G, model.joint_shapedirs, model.parents)
-    out = np.zeros((n, 3, 3 + 72 + n_betas + 1))
-    out[:, :, :3] = np.eye(3)
-    for i, carrier in enumerate(points.joint):
-        j = int(carrier)
-        shape = skeleton.G[j] @ points.shapedirs[i] + e[j]
-        out[i, :, 75: 75 + n_betas] = parameters.scale * shape
-        while j >= 0:
-            parent = int(model.parents[j])
-            axes = skeleton.G[parent] if parent >= 0 else np.eye(3)
-            lever = parameters.scale * (posed[i] - skeleton.p[j])
-            out[i, :, 3 + 3 * j: 6 + 3 * j] = np.cross(axes.T, lever).T
-            j = parent
-    out[:, :, -1] = parameters.scale * posed
+    out = np.empty((len(points.joint), 3, 3 + 72 + model.n_betas + 1))
+    kernels.attached_jacobian(
+        points.joint, _posed(points, skeleton, parameters.betas), points.shapedirs, skeleton.G,
+        skeleton.p, e, model.parents, parameters.scale, out,
+    )
     return out
 
 

@@ -183,3 +183,38 @@ def directional_jacobian(
                 out[i, 3 + 3 * j] = g[0, 0] * cx + g[1, 0] * cy + g[2, 0] * cz
                 out[i, 4 + 3 * j] = g[0, 1] * cx + g[1, 1] * cy + g[2, 1] * cz
                 out[i, 5 + 3 * j] = g[0, 2] * cx + g[1, 2] * cy + g[2, 2] * cz
+
+
+@njit(cache=True, nogil=True)
+def attached_jacobian(carrier, posed, shapedirs, G, p, e, parents, scale, out):
+    """Fill d(point)/d(parameters) into out (n, 3, 3 + 72 + B + 1) of points carried by one joint.
+
+    posed (n,3) are the points before scale and translation, shapedirs (n,3,B) their rest shape.
+    """
+    n_betas = shapedirs.shape[2]
+    first_beta = 3 + 3 * p.shape[0]
+    axis = np.eye(3)
+    out[:] = 0.0
+    for i in range(carrier.shape[0]):
+        j = carrier[i]
+        for r in range(3):
+            out[i, r, r] = 1.0
+            out[i, r, first_beta + n_betas] = scale * posed[i, r]
+            for b in range(n_betas):
+                total = e[j, r, b]
+                for c in range(3):
+                    total += G[j, r, c] * shapedirs[i, c, b]
+                out[i, r, first_beta + b] = scale * total
+        while j >= 0:
+            parent = parents[j]
+            lx = scale * (posed[i, 0] - p[j, 0])
+            ly = scale * (posed[i, 1] - p[j, 1])
+            lz = scale * (posed[i, 2] - p[j, 2])
+            for k in range(3):
+                ax, ay, az = axis[k, 0], axis[k, 1], axis[k, 2]
+                if parent >= 0:
+                    ax, ay, az = G[parent, 0, k], G[parent, 1, k], G[parent, 2, k]
+                out[i, 0, 3 + 3 * j + k] = ay * lz - az * ly
+                out[i, 1, 3 + 3 * j + k] = az * lx - ax * lz
+                out[i, 2, 3 + 3 * j + k] = ax * ly - ay * lx
+            j = parent

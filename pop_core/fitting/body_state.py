@@ -1,0 +1,95 @@
+"""A body at one point of the search: parameters and everything computed from them, once."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pop_core.body.kinematics import (
+    PosedSkeleton,
+    attached_jacobian,
+    attached_positions,
+    increment,
+    pose_skeleton,
+)
+from pop_core.body.model import AttachedPoints, BodyModel, BodyParameters, shared_points
+from pop_core.body.skinning import SkinningSubset
+from pop_core.rendering.depth_renderer import vertex_normals
+
+TRANSL = slice(0, 3)
+GLOBAL_ORIENT = slice(3, 6)
+BODY_POSE = slice(6, 75)
+
+
+def betas_slice(n_betas: int) -> slice:
+    """Return where the betas stand in the parameter vector."""
+    return slice(75, 75 + n_betas)
+
+
+class FitBody:
+    """A model prepared for fitting: one mesh (coarse or full) and the shared landmarks."""
+
+    def __init__(self, model: BodyModel, *, full: bool) -> None:
+        """Prepare the coarse fitting mesh of a model, or the full output mesh."""
+        self.model = model
+        self.skinning = SkinningSubset(model, None if full else model.fit_vertices)
+        self.faces: Int[np.ndarray, 'm 3'] = model.f if full else model.fit_faces
+        self.landmarks: AttachedPoints = shared_points(model)
+        self.size = 3 + 72 + model.n_betas + 1
+        self.main_bone: Int[np.ndarray, 'n'] = self.skinning.bone_ids[:, 0]
+
+    def state(self, parameters: BodyParameters) -> BodyState:
+        """Return the state of a set of parameters."""
+        return BodyState(self, parameters)
+
+
+class BodyState:
+    """Parameters with skeleton, vertices, normals and landmarks, each computed when first used."""
+
+    def __init__(self, body: FitBody, parameters: BodyParameters) -> None:
+        """Hold parameters of a prepared body."""
+        self.body = body
+        self.parameters = parameters
+
+    @cached_property
+    def skeleton(self) -> PosedSkeleton:
+        """Return the posed tree."""
+        return pose_skeleton(self.body.model, self.parameters)
+
+    @cached_property
+    def vertices(self) -> Float[np.ndarray, 'n 3']:
+        """Return the vertices of the fitting mesh [m], camera frame."""
+        return self.body.skinning.vertices(self.parameters, self.skeleton)
+
+    @cached_property
+    def normals(self) -> Float[np.ndarray, 'n 3']:
+        """Return outward unit normals of the vertices, camera frame."""
+        return vertex_normals(self.vertices, self.body.faces)
+
+    @cached_property
+    def joints(self) -> Float[np.ndarray, '24 3']:
+        """Return the 24 joints [m], camera frame."""
+        return self.parameters.scale * self.skeleton.p + self.parameters.transl
+
+    @cached_property
+    def landmarks(self) -> Float[np.ndarray, 's 3']:
+        """Return the 15 shared points [m], camera frame."""
+        return attached_positions(self.body.landmarks, self.body.model, self.parameters)
+
+    def landmark_jacobian(self) -> Float[np.ndarray, 's 3 x']:
+        """Return the derivative of the shared points."""
+        body = self.body
+        return attached_jacobian(body.landmarks, body.model, self.parameters, self.skeleton)
+
+    def directional_jacobian(
+        self, vertex: Int[np.ndarray, 'n'], direction: Float[np.ndarray, 'n 3']
+    ) -> Float[np.ndarray, 'n x']:
+        """Return the derivative of `direction . vertex` per row."""
+        return self.body.skinning.directional_jacobian(
+            self.parameters, self.skeleton, vertex, direction)
+
+    def moved(self, step: Float[np.ndarray, 'x']) -> BodyState:
+        """Return the state after a step."""
+        return BodyState(self.body, increment(self.parameters, step, self.skeleton))

@@ -1,0 +1,102 @@
+"""Pairs of measured points and body vertices for the surface term E_NN, in both directions."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.spatial import cKDTree
+
+from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.depth_consistency import Sight, Visibility
+from pop_core.fitting.observation import Observation, sensor_sigma_m
+from pop_core.fitting.residuals import Pairs, join_pairs, no_pairs
+from pop_core.fitting.robust_loss import geman_mcclure_weight
+
+SKIN_SIGMA_M = 0.010  # clothes, hair and the coarse mesh: never trust a point more than this
+EFFECTIVE_POINTS = 300.0  # neighbouring pixels err together; so many are worth independent ones
+VERTEX_SHARE = 0.3  # weight of vertex-to-point pairs beside point-to-vertex pairs
+
+
+def thin_points(
+    observation: Observation, segment: Bool[np.ndarray, 'h w'], most: int
+) -> tuple[Float[np.ndarray, 'n 3'], Int[np.ndarray, 'n']]:
+    """Return at most `most` points of the segment, evenly over its pixels, and their parts."""
+    v, u = np.nonzero(segment)
+    step = max(1, -(-len(v) // most))
+    mask = np.zeros_like(segment)
+    mask[v[::step], u[::step]] = True
+    parts = np.full(int(mask.sum()), -1)
+    if observation.labels is not None:
+        parts = observation.labels[mask].astype(np.int64)
+    return observation.points(mask), parts
+
+
+def match_points(
+    state: BodyState,
+    visibility: Visibility,
+    points: Float[np.ndarray, 'n 3'],
+    scale_m: float,
+) -> Pairs:
+    """Pair every measured point with its nearest vertex that faces the camera (pi_NN of E_NN).
+
+    Args:
+        state: Body.
+        visibility: Which vertices face the camera.
+        points: Measured points of H [m].
+        scale_m: Scale of the robust kernel [m].
+    """
+    facing = np.flatnonzero(visibility.facing)
+    if len(facing) == 0 or len(points) == 0:
+        return no_pairs()
+    distance, nearest = cKDTree(state.vertices[facing]).query(points)
+    return _plane_pairs(state, facing[nearest], points, distance, scale_m, EFFECTIVE_POINTS)
+
+
+def match_vertices(
+    state: BodyState, observation: Observation, visibility: Visibility, scale_m: float
+) -> Pairs:
+    """Pair every visible vertex with the point measured at its pixel."""
+    vertex = np.flatnonzero(visibility.sight == Sight.VISIBLE)
+    if len(vertex) == 0:
+        return no_pairs()
+    seen = state.vertices[vertex]
+    target = seen * (1 + visibility.gap_m[vertex] / seen[:, 2])[:, None]
+    share = VERTEX_SHARE * EFFECTIVE_POINTS
+    return _plane_pairs(state, vertex, target, visibility.gap_m[vertex], scale_m, share)
+
+
+def _plane_pairs(
+    state: BodyState,
+    vertex: Int[np.ndarray, 'n'],
+    target: Float[np.ndarray, 'n 3'],
+    distance: Float[np.ndarray, 'n'],
+    scale_m: float,
+    worth: float,
+) -> Pairs:
+    """Return point-to-plane pairs weighted by cos(theta) / sigma^2(z), robustly.
+
+    Args:
+        state: Body.
+        vertex: Vertex of each pair.
+        target: Measured point of each pair [m].
+        distance: Distance of each pair [m], seen by the robust kernel.
+        scale_m: Scale of the kernel [m].
+        worth: Number of independent points that all pairs together count for.
+    """
+    normal = state.normals[vertex]
+    ray = target / np.linalg.norm(target, axis=1, keepdims=True)
+    cosine = np.clip(-np.einsum('nc,nc->n', normal, ray), 0.1, 1.0)
+    variance = SKIN_SIGMA_M**2 + sensor_sigma_m(target[:, 2]) ** 2
+    weight = cosine / variance * geman_mcclure_weight(distance, scale_m)
+    return Pairs(vertex, normal, target, weight * (worth / len(vertex)))
+
+
+def tangential_pairs(pairs: Pairs, share: float) -> Pairs:
+    """Return the same pairs as point to point, at a share of their weight.
+
+    Planes let a limb slide along itself; a weak pull in all directions keeps it from drifting
+    while the pose is still wrong.
+    """
+    axes = [np.tile(axis, (len(pairs.vertex), 1)) for axis in np.eye(3)]
+    return join_pairs(
+        [Pairs(pairs.vertex, axis, pairs.target, pairs.weight * share) for axis in axes])

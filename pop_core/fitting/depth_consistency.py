@@ -1,0 +1,191 @@
+"""Consistency of a body with the depth image (step 8): visibility, free space and E_depth.
+
+The paper's null-space: a body must not stand where the sensor saw through it. A vertex is compared
+with the depth measured at its pixel: hidden behind something nearer it is free; in front of
+something farther it contradicts the measurement and is pushed to where it can hide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int
+
+from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.observation import Observation, nearest_of, sensor_sigma_m
+from pop_core.fitting.residuals import Pairs, join_pairs
+from pop_core.fitting.robust_loss import geman_mcclure_weight
+from pop_core.rendering.depth_renderer import RenderedDepth, render_depth
+
+SELF_TOLERANCE_M = 0.03  # z-buffer against vertex: a triangle's own slope
+CLOTHES_M = 0.03  # measured skin is cloth: it lies this far in front of the body at most
+SMALL_GAP_M = 0.12  # up to here a body is pushed back along the ray, beyond it sideways
+FREE_SIGMA_M = 0.03
+DEPTH_SLICES = 5
+
+
+class Sight(IntEnum):
+    """How a vertex relates to what the camera measured at its pixel."""
+
+    VISIBLE = 0
+    SELF_OCCLUDED = 1
+    SCENE_OCCLUDED = 2
+    OUT_OF_IMAGE = 3
+    UNKNOWN = 4
+    CONTRADICTED = 5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Visibility:
+    """The sight of every vertex of a fitting mesh.
+
+    Args:
+        sight: A Sight per vertex.
+        gap_m: Measured depth minus vertex depth [m]; NaN or inf where nothing was measured.
+        rendered: The body's own depth image.
+    """
+
+    sight: Int[np.ndarray, 'n']
+    gap_m: Float[np.ndarray, 'n']
+    rendered: RenderedDepth
+
+    @property
+    def facing(self) -> Bool[np.ndarray, 'n']:
+        """Return the vertices that nothing of the body itself hides."""
+        return self.sight != Sight.SELF_OCCLUDED
+
+
+def see_body(state: BodyState, observation: Observation) -> Visibility:
+    """Return the visibility of a body's vertices in an observation."""
+    rendered = render_depth(state.vertices, state.body.faces, observation.camera)
+    measured, uv = observation.depth_at(state.vertices)
+    z = state.vertices[:, 2]
+    inside = np.isfinite(measured) | np.isnan(measured)
+    safe = np.where(inside[:, None], uv, 0)
+    front = rendered.depth_m[safe[:, 1], safe[:, 0]]
+    toward = np.einsum('nc,nc->n', state.normals, state.vertices) < 0
+    hidden_by_self = ~toward | (inside & (front < z - SELF_TOLERANCE_M))
+    gap = measured - z
+    margin = CLOTHES_M + 2 * sensor_sigma_m(z)
+    other = inside & ~observation.own[safe[:, 1], safe[:, 0]]
+    sight = np.full(len(z), int(Sight.VISIBLE))
+    with np.errstate(invalid='ignore'):
+        sight[gap > margin] = Sight.CONTRADICTED
+        # Another person's pixel hides what lies behind it, however close.
+        sight[(gap < -3 * margin) | (other & (gap < margin))] = Sight.SCENE_OCCLUDED
+    sight[np.isnan(measured)] = Sight.UNKNOWN
+    sight[hidden_by_self] = Sight.SELF_OCCLUDED
+    sight[~inside] = Sight.OUT_OF_IMAGE
+    return Visibility(sight, gap, rendered)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HidingPlaces:
+    """For slices of depth: where something as near as the slice, or the person, covers a pixel.
+
+    Args:
+        slices_m: Depth of each slice [m], rising.
+        nearest: For each slice and pixel the nearest pixel (u, v) that can hide a body there.
+        exists: Whether a slice has any such pixel.
+    """
+
+    slices_m: Float[np.ndarray, 'd']
+    nearest: Int[np.ndarray, 'd h w 2']
+    exists: Bool[np.ndarray, 'd']
+
+
+def find_hiding_places(
+    observation: Observation, segment: Bool[np.ndarray, 'h w'], z: Float[np.ndarray, 'n']
+) -> HidingPlaces:
+    """Return the hiding places of a body whose vertices lie at depths z [m].
+
+    A pixel hides a body when it shows the body itself, something nearer, or nothing at all.
+    """
+    slices = np.linspace(z.min(), z.max(), DEPTH_SLICES)
+    nearest, exists = [], []
+    with np.errstate(invalid='ignore'):
+        for depth in slices:
+            able = segment | (observation.depth_m < depth) | np.isnan(observation.depth_m)
+            nearest.append(nearest_of(able)[1])
+            exists.append(bool(able.any()))
+    return HidingPlaces(slices, np.stack(nearest), np.array(exists))
+
+
+def free_space_pairs(
+    state: BodyState, observation: Observation, visibility: Visibility, places: HidingPlaces
+) -> Pairs:
+    """Return where vertices that the sensor saw through should go (E_free).
+
+    Small gaps are closed along the ray: the body merely stands too near. Large gaps mean that
+    the limb is elsewhere: it is pulled sideways toward the nearest pixel that can hide it at its
+    depth.
+    """
+    broken = visibility.sight == Sight.CONTRADICTED
+    small = np.flatnonzero(broken & (visibility.gap_m <= SMALL_GAP_M))
+    large = np.flatnonzero(broken & (visibility.gap_m > SMALL_GAP_M))
+    points = state.vertices[small]
+    ray = points / np.linalg.norm(points, axis=1, keepdims=True)
+    behind = points * (1 + visibility.gap_m[small] / points[:, 2])[:, None]
+    along = Pairs(small, ray, behind, np.full(len(small), 0.5 / FREE_SIGMA_M**2))
+    target, known = _hiding_targets(state, observation, places, large)
+    large, target = large[known], target[known]
+    pull = np.linalg.norm(state.vertices[large] - target, axis=1)
+    weight = 0.25 / FREE_SIGMA_M**2 * geman_mcclure_weight(pull, 0.3)
+    sideways = [Pairs(large, np.tile(axis, (len(large), 1)), target, weight) for axis in np.eye(2, 3)]
+    return join_pairs([along, *sideways])
+
+
+def depth_energy(
+    visibility: Visibility,
+    observation: Observation,
+    segment: Bool[np.ndarray, 'h w'],
+    limit_m: float = 0.15,
+) -> float:
+    """Return E_depth = |min(D_body, D_rest) - D_in|, truncated, per pixel of the segment.
+
+    D_rest is the scene with the person's segment moved to the far plane. Three cases remain: a
+    segment pixel the body leaves uncovered costs the limit; a body pixel in front of the
+    measured depth costs its gap; a body behind the scene costs nothing.
+
+    Args:
+        visibility: The body's rendering.
+        observation: D_in.
+        segment: The person's pixels, the same for every hypothesis that is compared.
+        limit_m: Truncation of a pixel's cost [m].
+    """
+    body, measured = visibility.rendered.depth_m, observation.depth_m
+    rest = np.where(segment, np.float32(np.inf), measured)
+    with np.errstate(invalid='ignore'):
+        # NaN (no measurement) can hide anything, so it costs nothing.
+        error = np.abs(np.minimum(body, rest) - measured)
+    error = np.minimum(np.where(np.isnan(measured), 0.0, error), limit_m)
+    return float(error.sum() / max(int(segment.sum()), 1))
+
+
+def free_space_violation(
+    rendered: RenderedDepth, depth_m: Float32[np.ndarray, 'h w'], limit_m: float = 0.05
+) -> float:
+    """Return the share of rendered body pixels that stand in front of measured depth."""
+    covered = rendered.covered & np.isfinite(depth_m)
+    violating = rendered.depth_m[covered] < depth_m[covered] - limit_m
+    return float(violating.mean()) if violating.size else 0.0
+
+
+def _hiding_targets(
+    state: BodyState,
+    observation: Observation,
+    places: HidingPlaces,
+    vertex: Int[np.ndarray, 'n'],
+) -> tuple[Float[np.ndarray, 'n 3'], Bool[np.ndarray, 'n']]:
+    """Return the point at each vertex's depth over the nearest pixel that can hide it."""
+    points = state.vertices[vertex]
+    _, uv = observation.depth_at(points)
+    # The slice at or before the vertex's depth is the cautious one: what it allows, hides.
+    which = np.searchsorted(places.slices_m, points[:, 2], side='right') - 1
+    which = np.clip(which, 0, len(places.slices_m) - 1)
+    pixel = places.nearest[which, uv[:, 1], uv[:, 0]]
+    ray = observation.rays[pixel[:, 1], pixel[:, 0]]
+    target = np.column_stack([ray * points[:, 2:], points[:, 2]])
+    return target, places.exists[which]

@@ -1,0 +1,95 @@
+"""The energy of one person: every term of the fit, gathered for one step of the solver."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.levenberg_marquardt import Residual
+from pop_core.fitting.observation import Observation
+from pop_core.fitting.priors import (
+    conditional_prior_residual,
+    limit_prior_residual,
+    pose_prior_residual,
+    shape_prior_residual,
+)
+from pop_core.fitting.residuals import (
+    Pairs,
+    joint_residual,
+    joint_weight,
+    pair_residual,
+    ray_residual,
+    ray_weight,
+)
+from pop_core.retrieval.pose_prior import PosePrior
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PriorBelief:
+    """What is believed of the pose before the surface is looked at.
+
+    Args:
+        prior: Pose prior learned from motion capture.
+        pose: Retrieved pose of this hypothesis [rad].
+        sigma_rad: Spread of the retrieved neighbours per joint [rad].
+    """
+
+    prior: PosePrior
+    pose: Float[np.ndarray, '23 3']
+    sigma_rad: Float[np.ndarray, '23']
+
+
+@dataclass(frozen=True, slots=True)
+class TermWeights:
+    """Multipliers of the terms in one part of the schedule.
+
+    Args:
+        joints: Of E_J3D.
+        prior: Of the pose prior.
+        neighbours: Of the conditional prior.
+        robust_m: Scale of the robust kernel of E_J3D [m].
+    """
+
+    joints: float = 1.0
+    prior: float = 1.0
+    neighbours: float = 1.0
+    robust_m: float = 0.15
+
+
+class BodyEnergy:
+    """All terms with their robust weights and pairs held constant, as one step needs them."""
+
+    def __init__(
+        self,
+        state: BodyState,
+        observation: Observation,
+        belief: PriorBelief,
+        weights: TermWeights,
+        pairs: Pairs | None = None,
+    ) -> None:
+        """Freeze robust weights at `state`."""
+        self.observation, self.belief, self.weights, self.pairs = (
+            observation, belief, weights, pairs)
+        lifted, camera = observation.window_joints, observation.camera
+        self.joint_weight = weights.joints * joint_weight(state, lifted, weights.robust_m)
+        self.ray_weight = weights.joints * ray_weight(state, lifted, camera)
+
+    def residuals(self, state: BodyState, jacobian: bool) -> list[Residual]:  # noqa: FBT001
+        """Return every block of residuals at a state."""
+        lifted, camera = self.observation.window_joints, self.observation.camera
+        belief, weights = self.belief, self.weights
+        blocks = [
+            joint_residual(state, lifted, self.joint_weight, jacobian=jacobian),
+            ray_residual(state, lifted, camera, self.ray_weight, jacobian=jacobian),
+            pose_prior_residual(state, belief.prior, weights.prior, jacobian=jacobian),
+            conditional_prior_residual(
+                state, belief.pose, belief.sigma_rad, weights.neighbours, jacobian=jacobian),
+            limit_prior_residual(state, jacobian=jacobian),
+            shape_prior_residual(state, jacobian=jacobian),
+        ]
+        if self.pairs is not None and len(self.pairs.vertex):
+            blocks.append(pair_residual(state, self.pairs, jacobian=jacobian))
+        return blocks

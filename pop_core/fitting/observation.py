@@ -1,0 +1,148 @@
+"""What the sensor says about one person, cut out and thinned to the size the fit needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int
+
+from pop_core.geometry.camera import Camera
+from pop_core.keypoints.lifted_joints import LiftedJoints
+from pop_core.rgbd import RgbdFrame, flying_pixels
+
+REACH_M = 1.25  # half size of the window around a person: a tall one with a raised arm fits
+WINDOW_PX = 240  # longest side of the thinned window
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A rectangle of the image, every `stride`-th pixel of it."""
+
+    left: int
+    top: int
+    width: int
+    height: int
+    stride: int
+
+    def cut(self, image: np.ndarray) -> np.ndarray:
+        """Return the thinned cut-out of an image."""
+        bottom, right = self.top + self.height, self.left + self.width
+        return np.ascontiguousarray(
+            image[self.top: bottom: self.stride, self.left: right: self.stride])
+
+    def camera(self, camera: Camera) -> Camera:
+        """Return the pinhole that sees the cut-out."""
+        s = self.stride
+        return Camera(
+            -(-self.width // s), -(-self.height // s), camera.fx / s, camera.fy / s,
+            (camera.cx - self.left) / s, (camera.cy - self.top) / s,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """One person's window of the depth image, and the joints lifted in it.
+
+    Args:
+        window: Where the cut-out lies in the frame.
+        camera: Pinhole of the cut-out.
+        depth_m: Measured depth [m]; NaN is no measurement.
+        rays: (x/z, y/z) of every pixel.
+        own: Pixels that may show this person: measured, not flying, not another person's.
+        labels: Body part per pixel as a joint index, -1 where unknown; None without a part map.
+        window_joints: Lifted joints of the person, their pixels those of the window.
+    """
+
+    window: Window
+    camera: Camera
+    depth_m: Float32[np.ndarray, 'h w']
+    rays: Float[np.ndarray, 'h w 2']
+    own: Bool[np.ndarray, 'h w']
+    labels: Int[np.ndarray, 'h w'] | None
+    window_joints: LiftedJoints
+
+    def points(self, mask: Bool[np.ndarray, 'h w']) -> Float[np.ndarray, 'n 3']:
+        """Return the measured points of a mask [m], camera frame, in row order."""
+        z = self.depth_m[mask].astype(np.float64)
+        return np.column_stack([self.rays[mask] * z[:, None], z])
+
+    def depth_at(
+        self, p_camera: Float[np.ndarray, 'n 3']
+    ) -> tuple[Float[np.ndarray, 'n'], Int[np.ndarray, 'n 2']]:
+        """Return measured depth [m] at the pixels of points, and those pixels (u, v).
+
+        Depth is NaN where nothing was measured and +inf outside the window: the camera does not
+        see there, so nothing contradicts a body.
+        """
+        uv = np.rint(self.camera.project(p_camera))
+        uv = np.where(np.isfinite(uv), uv, -1).astype(np.int64)
+        inside = (uv >= 0).all(axis=1) & (uv < [self.camera.width, self.camera.height]).all(axis=1)
+        safe = np.where(inside[:, None], uv, 0)
+        depth = self.depth_m[safe[:, 1], safe[:, 0]].astype(np.float64)
+        return np.where(inside, depth, np.inf), uv
+
+
+def sensor_sigma_m(depth_m: Float[np.ndarray, '*n']) -> Float[np.ndarray, '*n']:
+    """Return the standard deviation of measured depth [m] (Nguyen, Izadi and Lovell 2012)."""
+    return 0.0012 + 0.0019 * (depth_m - 0.4) ** 2
+
+
+def observe(
+    frame: RgbdFrame,
+    lifted: LiftedJoints,
+    others: Bool[np.ndarray, 'h w'],
+    labels: Int[np.ndarray, 'h w'] | None = None,
+) -> Observation:
+    """Return the observation of one person.
+
+    Args:
+        frame: The undistorted frame.
+        lifted: The person's joints; at least one is lifted.
+        others: Pixels already explained by nearer people; they stay in the depth as occluders.
+        labels: Body part per pixel as a joint index, -1 where unknown.
+    """
+    window = person_window(lifted, frame.camera)
+    camera = window.camera(frame.camera)
+    depth_m = window.cut(frame.depth_m)
+    own = np.isfinite(depth_m) & ~window.cut(others) & ~window.cut(flying_pixels(frame.depth_m))
+    parts = None if labels is None else window.cut(labels)
+    rays = camera.ray_grid()
+    pixels = (lifted.keypoints_px - [window.left, window.top]) / window.stride
+    window_joints = replace(lifted, keypoints_px=pixels)
+    return Observation(window, camera, depth_m, rays, own, parts, window_joints)
+
+
+def person_window(lifted: LiftedJoints, camera: Camera) -> Window:
+    """Return the window of everything a person at the lifted joints can reach."""
+    seen = lifted.positions_camera[lifted.lifted]
+    low = seen.min(axis=0) / 2 + seen.max(axis=0) / 2 - REACH_M
+    high = low + 2 * REACH_M
+    z = max(float(np.median(seen[:, 2])), 0.5)
+    # A person close to the camera reaches beyond every border: the whole image then.
+    left = _clamp(low[0] / z * camera.fx + camera.cx, camera.width)
+    right = _clamp(high[0] / z * camera.fx + camera.cx, camera.width)
+    top = _clamp(low[1] / z * camera.fy + camera.cy, camera.height)
+    bottom = _clamp(high[1] / z * camera.fy + camera.cy, camera.height)
+    width, height = max(right - left, 1), max(bottom - top, 1)
+    stride = max(1, -(-max(width, height) // WINDOW_PX))
+    return Window(min(left, camera.width - 1), min(top, camera.height - 1), width, height, stride)
+
+
+def nearest_of(
+    mask: Bool[np.ndarray, 'h w'],
+) -> tuple[Float32[np.ndarray, 'h w'], Int[np.ndarray, 'h w 2']]:
+    """Return the distance [px] to the nearest pixel of a mask, and that pixel (u, v)."""
+    distance, label = cv2.distanceTransformWithLabels(
+        (~mask).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    v, u = np.nonzero(mask)
+    if len(v) == 0:
+        return distance, np.zeros((*mask.shape, 2), dtype=np.int64)
+    pixel_of_label = np.zeros((len(v) + 1, 2), dtype=np.int64)
+    pixel_of_label[label[v, u]] = np.column_stack([u, v])
+    return distance, pixel_of_label[label]
+
+
+def _clamp(value: float, size: int) -> int:
+    return int(np.clip(round(value), 0, size))

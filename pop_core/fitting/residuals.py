@@ -1,0 +1,135 @@
+"""Data terms of the fit: functions from a state to weighted residuals and their Jacobians.
+
+Lengths in metres; weights are 1/sigma^2 times robust weights that count as constant in a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.levenberg_marquardt import Residual
+from pop_core.fitting.robust_loss import geman_mcclure_weight
+from pop_core.geometry.camera import Camera
+from pop_core.keypoints.lifted_joints import LiftedJoints
+
+RAY_SIGMA_PX = 12.0  # a detector's guess of a hidden joint is rarely better
+
+
+def joint_weight(
+    state: BodyState, lifted: LiftedJoints, scale_m: float
+) -> Float[np.ndarray, 's']:
+    """Return the robust weight 1/sigma^2 of every shared joint, zero unless lifted."""
+    distance = np.linalg.norm(state.landmarks - lifted.positions_camera, axis=1)
+    robust = geman_mcclure_weight(np.where(lifted.lifted, distance, 0.0), scale_m)
+    return np.where(lifted.lifted, robust / lifted.sigma_m**2, 0.0)
+
+
+def joint_residual(
+    state: BodyState, lifted: LiftedJoints, weight: Float[np.ndarray, 's'], *, jacobian: bool
+) -> Residual:
+    """Return E_J3D: offsets of the shared points from the lifted joints (Eq. 2)."""
+    rows = np.flatnonzero(weight > 0)
+    difference = (state.landmarks[rows] - lifted.positions_camera[rows]).reshape(-1)
+    J = state.landmark_jacobian()[rows].reshape(3 * len(rows), -1) if jacobian else None
+    return Residual(difference, J, np.repeat(weight[rows], 3))
+
+
+def ray_weight(
+    state: BodyState, lifted: LiftedJoints, camera: Camera
+) -> Float[np.ndarray, 's']:
+    """Return the weight 1/sigma^2 of keypoints that have a pixel but no depth, zero elsewhere.
+
+    A detector's pixel of a hidden joint fixes its direction though nothing fixes its distance.
+    """
+    known = np.isfinite(lifted.keypoints_px).all(axis=1) & ~lifted.lifted
+    sigma_m = RAY_SIGMA_PX / camera.fx * np.maximum(state.landmarks[:, 2], 0.3)
+    across = _across(lifted, camera)
+    distance = np.linalg.norm(np.einsum('nkc,nc->nk', across, state.landmarks), axis=1)
+    robust = geman_mcclure_weight(distance, 0.25)
+    return np.where(known, np.nan_to_num(lifted.scores) * robust / sigma_m**2, 0.0)
+
+
+def ray_residual(
+    state: BodyState,
+    lifted: LiftedJoints,
+    camera: Camera,
+    weight: Float[np.ndarray, 's'],
+    *,
+    jacobian: bool,
+) -> Residual:
+    """Return the distance of shared points to the rays of their keypoints, in two directions.
+
+    Args:
+        state: Body.
+        lifted: Keypoints.
+        camera: Pinhole whose pixels `lifted.keypoints_px` are.
+        weight: Weight per joint; joints of weight zero are left out.
+        jacobian: Whether to compute the derivative.
+    """
+    rows = np.flatnonzero(weight > 0)
+    across = _across(lifted, camera)[rows]
+    distance = np.einsum('nkc,nc->nk', across, state.landmarks[rows])
+    J = None
+    if jacobian:
+        J = np.einsum('nkc,ncx->nkx', across, state.landmark_jacobian()[rows])
+        J = J.reshape(2 * len(rows), -1)
+    return Residual(distance.reshape(-1), J, np.repeat(weight[rows], 2))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pairs:
+    """Vertices and where they should go, each measured along one fixed direction.
+
+    Point-to-plane pairs use the vertex's normal, free-space pairs the viewing ray, and
+    point-to-point pairs come as three rows. Directions count as constant in a step.
+
+    Args:
+        vertex: Index into the fitting mesh.
+        direction: Unit vector, camera frame.
+        target: Point [m], camera frame.
+        weight: 1/sigma^2, robustness included.
+    """
+
+    vertex: Int[np.ndarray, 'n']
+    direction: Float[np.ndarray, 'n 3']
+    target: Float[np.ndarray, 'n 3']
+    weight: Float[np.ndarray, 'n']
+
+
+def no_pairs() -> Pairs:
+    """Return an empty set of pairs."""
+    return Pairs(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+
+
+def join_pairs(parts: Sequence[Pairs]) -> Pairs:
+    """Return all pairs of several sets."""
+    return Pairs(
+        np.concatenate([part.vertex for part in parts]),
+        np.concatenate([part.direction for part in parts]),
+        np.concatenate([part.target for part in parts]),
+        np.concatenate([part.weight for part in parts]),
+    )
+
+
+def pair_residual(state: BodyState, pairs: Pairs, *, jacobian: bool) -> Residual:
+    """Return the offset of vertices from their targets along each pair's direction."""
+    offset = state.vertices[pairs.vertex] - pairs.target
+    r = np.einsum('nc,nc->n', pairs.direction, offset)
+    J = state.directional_jacobian(pairs.vertex, pairs.direction) if jacobian else None
+    return Residual(r, J, pairs.weight)
+
+
+def _across(lifted: LiftedJoints, camera: Camera) -> Float[np.ndarray, 's 2 3']:
+    """Return two unit vectors across the ray of each keypoint; undetected ones look ahead."""
+    known = np.isfinite(lifted.keypoints_px).all(axis=1)
+    uv = np.where(known[:, None], lifted.keypoints_px, [camera.cx, camera.cy])
+    ray = camera.unproject(uv, np.ones(len(uv)))
+    unit = ray / np.linalg.norm(ray, axis=1, keepdims=True)
+    first = np.cross(unit, [0.0, 1.0, 0.0])
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(unit, first)], axis=1)

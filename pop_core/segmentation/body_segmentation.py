@@ -1,0 +1,74 @@
+"""Segmentation of the human in the depth image by the rendered body (step 6)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float32
+
+from pop_core.rendering.depth_renderer import RenderedDepth
+from pop_core.segmentation import growth_kernels
+from pop_core.settings import setting
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentationConfig:
+    """How the human is cut out of the depth image."""
+
+    gamma_m: float = setting(
+        0.03, unit='m', minimum=0.005, maximum=0.2,
+        about="Depth step between neighbouring pixels that still counts as one surface, the "
+        "paper's gamma.")
+    tolerance_m: float = setting(
+        0.10, unit='m', minimum=0.02, maximum=0.5,
+        about='Distance between measured and rendered depth up to which a pixel is the body.')
+    growth_m: float = setting(
+        0.06, unit='m', minimum=0.0, maximum=0.3,
+        about='How far the segment may grow beyond the rendered silhouette: clothes and hair.')
+
+
+def segment_body(
+    depth_m: Float32[np.ndarray, 'h w'],
+    rendered: RenderedDepth,
+    own: Bool[np.ndarray, 'h w'],
+    focal_px: float,
+    config: SegmentationConfig,
+) -> Bool[np.ndarray, 'h w']:
+    """Return the pixels that show the person: the mask of the paper's clean depth and of H.
+
+    The rendered body is a mask; pixels around it join when their depth is within gamma of a
+    neighbour already inside. Growth stays within `growth_m` of the silhouette and `tolerance_m`
+    of the depth of the nearest rendered pixel, so that it cannot run along a seat or a floor.
+
+    Args:
+        depth_m: Measured depth D_in [m].
+        rendered: Rendered depth of the body, D(beta, theta).
+        own: Pixels that may show this person.
+        focal_px: Focal length [px], which turns `growth_m` into pixels.
+        config: Thresholds.
+    """
+    covered = rendered.covered
+    if not covered.any():
+        return np.zeros(depth_m.shape, dtype=bool)
+    distance_px, extended_m = _extend(rendered)
+    with np.errstate(invalid='ignore'):
+        similar = own & (np.abs(depth_m - extended_m) < config.tolerance_m)
+    segment = similar & covered
+    reach_px = config.growth_m * focal_px / np.maximum(extended_m, 0.3)
+    allowed = similar & (distance_px <= reach_px)
+    growth_kernels.grow(segment, allowed, depth_m, config.gamma_m)
+    return segment
+
+
+def _extend(
+    rendered: RenderedDepth,
+) -> tuple[Float32[np.ndarray, 'h w'], Float32[np.ndarray, 'h w']]:
+    """Return the distance to the silhouette [px] and the depth of its nearest pixel [m]."""
+    covered = rendered.covered
+    distance, label = cv2.distanceTransformWithLabels(
+        (~covered).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    depth_of_label = np.zeros(int(label.max()) + 1, dtype=np.float32)
+    depth_of_label[label[covered]] = rendered.depth_m[covered]
+    return distance, depth_of_label[label]
