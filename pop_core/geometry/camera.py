@@ -138,4 +138,7 @@ class Camera:
             return cv2.fisheye.undistortPoints(uv[:, None], self.K, self.d)[:, 0]
         # The default 5 iterations leave 0.1 px at the corners of wide lenses.
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-8)
-        return cv2.undistortPointsIter(uv[:, None], self.K, self.d, None, None, criteria)[:, 0]
+        # OpenCV 5 gave undistortPoints the criteria of OpenCV 4's undistortPointsIter.
+        undistort = getattr(cv2, 'undistortPointsIter', cv2.undistortPoints)
+        rays = undistort(uv[:, None], self.K, self.d, R=None, P=None, criteria=criteria)
+        return np.asarray(rays)[:, 0]
