@@ -1,0 +1,86 @@
+"""One worker thread that always works on the newest item."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+ItemT = TypeVar('ItemT')
+
+
+class Mailbox(Generic[ItemT]):
+    """A slot for one item: a newer item replaces one that nobody has taken yet."""
+
+    def __init__(self) -> None:
+        self._condition = threading.Condition()
+        self._item: ItemT | None = None
+        self._closed = False
+
+    def put(self, item: ItemT) -> bool:
+        """Store an item; return whether it replaced one that was never taken."""
+        with self._condition:
+            replaced = self._item is not None
+            self._item = item
+            self._condition.notify()
+            return replaced
+
+    def take(self) -> ItemT | None:
+        """Wait for an item and take it; None once the mailbox is closed."""
+        with self._condition:
+            self._condition.wait_for(lambda: self._item is not None or self._closed)
+            item, self._item = self._item, None
+            return None if self._closed else item
+
+    def close(self) -> None:
+        """Wake the taker for the last time; an item that waits is dropped."""
+        with self._condition:
+            self._closed = True
+            self._condition.notify_all()
+
+
+class Worker(Generic[ItemT]):
+    """A thread that hands the newest item to a function and survives its errors."""
+
+    def __init__(
+        self,
+        process: Callable[[ItemT], None],
+        on_error: Callable[[Exception], None],
+        prepare: Callable[[], None] | None = None,
+    ) -> None:
+        """Prepare the thread.
+
+        Args:
+            process: Called with each item taken.
+            on_error: Told of every exception of `process`.
+            prepare: Called once in the thread before the first item; its exceptions end the
+                thread after `on_error` has been told.
+        """
+        self.mailbox: Mailbox[ItemT] = Mailbox()
+        self._process, self._on_error, self._prepare = process, on_error, prepare
+        # A daemon, so that an endless computation cannot keep a stopped node alive.
+        self._thread = threading.Thread(target=self._run, name='pop worker', daemon=True)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def stop(self, timeout_s: float) -> bool:
+        """Ask the thread to end; return whether it did within `timeout_s`."""
+        self.mailbox.close()
+        if self._thread.is_alive():
+            self._thread.join(timeout_s)
+        return not self._thread.is_alive()
+
+    def _run(self) -> None:
+        try:
+            if self._prepare is not None:
+                self._prepare()
+        except Exception as error:  # noqa: BLE001 - whatever it is, the node must say it
+            self._on_error(error)
+            return
+        while (item := self.mailbox.take()) is not None:
+            try:
+                self._process(item)
+            except Exception as error:  # noqa: BLE001 - one bad frame must not end the node
+                self._on_error(error)
