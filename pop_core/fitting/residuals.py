@@ -35,7 +35,7 @@ def joint_residual(
     """Return E_J3D: offsets of the shared points from the lifted joints (Eq. 2)."""
     rows = np.flatnonzero(weight > 0)
     difference = (state.landmarks[rows] - lifted.positions_camera[rows]).reshape(-1)
-    J = state.landmark_jacobian()[rows].reshape(3 * len(rows), -1) if jacobian else None
+    J = state.landmark_jacobian()[rows].reshape(-1, state.body.size) if jacobian else None
     return Residual(difference, J, np.repeat(weight[rows], 3))
 
 
@@ -77,7 +77,7 @@ def ray_residual(
     J = None
     if jacobian:
         J = np.einsum('nkc,ncx->nkx', across, state.landmark_jacobian()[rows])
-        J = J.reshape(2 * len(rows), -1)
+        J = J.reshape(2 * len(rows), state.body.size)
     return Residual(distance.reshape(-1), J, np.repeat(weight[rows], 2))
 
 

@@ -1,0 +1,191 @@
+"""The paper's section 4 as one function: from an RGB-D frame to the bodies of its people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from threadpoolctl import ThreadpoolController
+
+from pop_core.body.kinematics import joint_rotations
+from pop_core.body.model import BodyModel
+from pop_core.body.skinning import vertices
+from pop_core.config import PipelineConfig
+from pop_core.estimate import BodyEstimate, EstimateStatus, FrameResult
+from pop_core.fitting.body_fit import BodyFit, BodyFitter
+from pop_core.fitting.joint_state import joint_states
+from pop_core.fitting.observation import Observation, observe
+from pop_core.fitting.uncertainty import joint_covariance
+from pop_core.geometry.camera import Camera
+from pop_core.keypoints.detection import Detection, KeypointDetector
+from pop_core.keypoints.lifted_joints import LiftedJoints
+from pop_core.keypoints.lifting import lift_keypoints
+from pop_core.rendering.depth_renderer import render_depth
+from pop_core.retrieval.candidate import PoseCandidate
+from pop_core.retrieval.pose_library import PoseLibrary
+from pop_core.retrieval.pose_prior import PosePrior, load_pose_prior
+from pop_core.retrieval.retrieve import retrieve
+from pop_core.rgbd import RgbdFrame, undistort_frame
+from pop_core.segmentation.body_segmentation import segment_body
+from pop_core.stopwatch import Stopwatch
+
+SUPPORT_M = 0.08  # measured and rendered depth agree within clothes and a small misfit
+
+
+class BodyPipeline:
+    """Finds, fits and segments every person of a frame."""
+
+    def __init__(
+        self,
+        model: BodyModel,
+        library: PoseLibrary,
+        detector: KeypointDetector,
+        config: PipelineConfig | None = None,
+        prior: PosePrior | None = None,
+    ) -> None:
+        """Prepare the pipeline for one body model, pose library and keypoint source."""
+        self.model, self.library, self.detector = model, library, detector
+        self.config = config or PipelineConfig()
+        self.fitter = BodyFitter(
+            model, prior or load_pose_prior(), self.config.fitting, self.config.segmentation)
+        # Small products are slower on several BLAS threads than on one (benchmarks/solver).
+        self._blas = ThreadpoolController()
+
+    def process(self, frame: RgbdFrame) -> FrameResult:
+        """Return the bodies of a frame, nearest first (steps 1 to 8 of the paper).
+
+        Raises:
+            PopError: If the keypoint source cannot read what it needs for this frame.
+        """
+        watch = Stopwatch()
+        with watch.step('detect'):
+            detections = self.detector.detect(frame)
+        with watch.step('undistort'):
+            seen = undistort_frame(frame)
+            detections = [undistort_detection(d, frame.camera) for d in detections]
+        with self._blas.limit(limits=1, user_api='blas'):
+            bodies, statuses = self._fit_people(seen, detections, watch)
+        bodies = [replace(b, mask=distort_mask(b.mask, frame.camera)) for b in bodies]
+        return FrameResult(tuple(bodies), tuple(statuses), watch.times_ms)
+
+    def _fit_people(
+        self, frame: RgbdFrame, detections: Sequence[Detection], watch: Stopwatch
+    ) -> tuple[list[BodyEstimate], list[EstimateStatus]]:
+        """Fit one person after the other, nearest first, each an occluder of the next."""
+        with watch.step('lift'):
+            lifted = [lift_keypoints(frame, d, self.config.lifting) for d in detections]
+        distance_m = [_distance_m(joints) for joints in lifted]
+        statuses = [self._admit(j, z) for j, z in zip(lifted, distance_m, strict=True)]
+        bodies: list[BodyEstimate] = []
+        taken = np.zeros(frame.depth_m.shape, dtype=bool)
+        for i in np.argsort(distance_m, kind='stable'):
+            if statuses[i] is not EstimateStatus.OK or len(bodies) >= self.config.max_people:
+                continue
+            estimate, status = self._fit_person(frame, detections[i], lifted[i], taken, watch)
+            statuses[i] = status
+            if estimate is not None:
+                bodies.append(estimate)
+                taken |= estimate.mask
+        return bodies, statuses
+
+    def _fit_person(
+        self,
+        frame: RgbdFrame,
+        detection: Detection,
+        lifted: LiftedJoints,
+        taken: Bool[np.ndarray, 'h w'],
+        watch: Stopwatch,
+    ) -> tuple[BodyEstimate | None, EstimateStatus]:
+        """Retrieve, fit and segment one person."""
+        with watch.step('observe'):
+            observation = observe(frame, lifted, taken, detection.part_labels)
+        with watch.step('retrieve'):
+            candidates = self._retrieve(lifted, observation)
+        with watch.step('fit'):
+            fit = self.fitter.fit(observation, candidates)
+        with watch.step('segment'):
+            estimate = self._estimate(frame, fit, lifted, taken)
+        if estimate.score < self.config.min_support:
+            return None, EstimateStatus.NO_SUPPORT
+        return estimate, EstimateStatus.OK
+
+    def _retrieve(
+        self, lifted: LiftedJoints, observation: Observation
+    ) -> Sequence[PoseCandidate]:
+        def in_the_open_m(p_camera: Float[np.ndarray, 'n 3']) -> Float[np.ndarray, 'n']:
+            """Return how far points stand in front of what the camera measured there."""
+            gap = observation.depth_at(p_camera)[0] - p_camera[:, 2]
+            return np.where(np.isfinite(gap), np.maximum(gap, 0.0), 0.0)
+
+        return retrieve(self.library, lifted, self.config.retrieval, hides=in_the_open_m)
+
+    def _estimate(
+        self, frame: RgbdFrame, fit: BodyFit, lifted: LiftedJoints, taken: Bool[np.ndarray, 'h w']
+    ) -> BodyEstimate:
+        """Return the result of a fit at the frame's full resolution."""
+        parameters = fit.parameters
+        mesh = vertices(self.model, parameters)
+        rendered = render_depth(mesh, self.model.f, frame.camera)
+        own = np.isfinite(frame.depth_m) & ~taken
+        mask = segment_body(
+            frame.depth_m, rendered, own, frame.camera.fx, self.config.segmentation)
+        joints = fit.coarse.joints
+        state = joint_states(joints, rendered, frame.depth_m, frame.camera)
+        covariance = joint_covariance(
+            self.model, parameters, fit.hessian, fit.runners_up, state)
+        with np.errstate(invalid='ignore'):
+            open_to_view = rendered.covered & ~(frame.depth_m < rendered.depth_m - SUPPORT_M)
+            agrees = open_to_view & (np.abs(frame.depth_m - rendered.depth_m) < SUPPORT_M) & own
+        support = float(agrees.sum() / max(int((open_to_view & own).sum()), 1))
+        return BodyEstimate(
+            parameters=parameters, vertices=mesh, joints=joints,
+            joint_rotations=joint_rotations(self.model, parameters), joint_state=state,
+            joint_covariance=covariance, mask=mask, score=support,
+            energies=fit.energies, runners_up=fit.runners_up,
+        )
+
+    def _admit(self, lifted: LiftedJoints, distance_m: float) -> EstimateStatus:
+        if int(lifted.lifted.sum()) < self.config.min_joints:
+            return EstimateStatus.TOO_FEW_JOINTS
+        if distance_m > self.config.max_range_m:
+            return EstimateStatus.TOO_FAR
+        return EstimateStatus.OK
+
+
+def undistort_detection(detection: Detection, camera: Camera) -> Detection:
+    """Return a detection whose pixels are those of the pure pinhole.
+
+    Masks and part maps are dropped: they belong to the distorted image.
+    """
+    if not camera.is_distorted:
+        return detection
+    known = np.isfinite(detection.keypoints_px).all(axis=1)
+    pinhole = camera.without_distortion()
+    uv = np.full_like(detection.keypoints_px, np.nan)
+    points = camera.unproject(detection.keypoints_px[known], np.ones(int(known.sum())))
+    uv[known] = pinhole.project(points)
+    corners = camera.unproject(detection.box_px.reshape(2, 2), np.ones(2))
+    return replace(
+        detection, keypoints_px=uv, box_px=pinhole.project(corners).reshape(4),
+        person_mask=None, part_labels=None)
+
+
+def distort_mask(
+    mask: Bool[np.ndarray, 'h w'], camera: Camera
+) -> Bool[np.ndarray, 'h w']:
+    """Return a mask of the pinhole image in the pixels of the camera's own image."""
+    if not camera.is_distorted:
+        return mask
+    rays = camera.ray_grid()
+    u = np.rint(rays[..., 0] * camera.fx + camera.cx).astype(np.int64)
+    v = np.rint(rays[..., 1] * camera.fy + camera.cy).astype(np.int64)
+    inside = (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
+    return inside & mask[np.where(inside, v, 0), np.where(inside, u, 0)]
+
+
+def _distance_m(lifted: LiftedJoints) -> float:
+    """Return the median depth of the lifted joints [m]; inf when there are none."""
+    z = lifted.positions_camera[lifted.lifted, 2]
+    return float(np.median(z)) if len(z) else float('inf')
