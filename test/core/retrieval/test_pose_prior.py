@@ -1,0 +1,85 @@
+import numpy as np
+import pytest
+
+from pop_core.body.joint_limits import mirrored_pose, pose_coordinates
+from pop_core.errors import LibraryFileError
+from pop_core.geometry.rotation import from_rotvec, to_rotvec
+from pop_core.retrieval.pose_prior import PosePrior, load_pose_prior
+
+
+def test_half_the_squared_residual_is_the_log_density_but_for_a_constant():
+    prior = load_pose_prior()
+    poses = prior.sample(np.random.default_rng(0), 40)
+    energy = np.array([0.5 * np.sum(prior.residual(pose)[0] ** 2) for pose in poses])
+    cost = prior.component_costs(pose_coordinates(poses).reshape(40, -1)).min(axis=1)
+    assert np.allclose(energy - cost, (energy - cost)[0], atol=1e-6)
+
+
+def test_component_density_is_that_of_its_covariance():
+    prior = load_pose_prior()
+    c = pose_coordinates(prior.sample(np.random.default_rng(1), 1)).reshape(-1)
+    k = 1
+    covariance = prior.factors[k] @ prior.factors[k].T + np.diag(prior.variances[k])
+    offset = c - prior.means[k]
+    _, log_det = np.linalg.slogdet(2 * np.pi * covariance)
+    expected = 0.5 * (offset @ np.linalg.solve(covariance, offset) + log_det)
+    found = prior.component_costs(c[None])[0, k] + np.log(prior.weights[k])
+    assert np.isclose(found, expected)
+
+
+def test_jacobian_agrees_with_central_differences():
+    prior = load_pose_prior()
+    for pose in prior.sample(np.random.default_rng(2), 3):
+        R = from_rotvec(pose)
+        _, jacobian = prior.residual(pose)
+        for column in range(0, 69, 5):
+            delta = np.zeros(69)
+            delta[column] = 1e-6
+            both = [
+                prior.residual(to_rotvec(from_rotvec(sign * delta.reshape(23, 3)) @ R))[0]
+                for sign in (1, -1)
+            ]
+            assert np.allclose(jacobian[:, column], (both[0] - both[1]) / 2e-6, atol=1e-4)
+
+
+def test_samples_have_the_moments_of_their_component():
+    prior = load_pose_prior()
+    c = pose_coordinates(prior.sample_components(
+        np.random.default_rng(3), np.zeros(20000, dtype=np.int64))).reshape(20000, -1)
+    sigma = np.sqrt(np.sum(prior.factors[0] ** 2, axis=1) + prior.variances[0])
+    # Four standard errors of a mean; wrapped tails of wide joints move it slightly.
+    assert np.all(np.abs(c.mean(axis=0) - prior.means[0]) < 4.5 * sigma / np.sqrt(20000) + 2e-3)
+
+
+def test_sampling_is_decided_by_its_seed():
+    prior = load_pose_prior()
+    first, second = (prior.sample(np.random.default_rng(4), 5) for _ in range(2))
+    assert np.array_equal(first, second)
+
+
+def test_knees_that_bend_forward_are_less_likely_than_knees_that_bend_back():
+    prior = load_pose_prior()
+    pose = prior.sample(np.random.default_rng(5), 1)
+    forward, back = pose.copy(), pose.copy()
+    forward[0, 3, 0], back[0, 3, 0] = -1.0, 1.0
+    assert prior.log_density(back)[0] > prior.log_density(forward)[0] + 20
+
+
+def test_poses_and_their_mirror_images_are_alike_likely():
+    prior = load_pose_prior()
+    poses = prior.sample(np.random.default_rng(6), 200)
+    gap = prior.log_density(poses) - prior.log_density(mirrored_pose(poses))
+    # Learned from mirrored data; components are not tied to mirror twins, so only on average.
+    assert abs(np.mean(gap)) < 3.0
+
+
+def test_a_file_that_is_no_prior_is_named(tmp_path):
+    path = tmp_path / 'prior.npz'
+    np.savez(path, weights=np.ones(1))
+    with pytest.raises(LibraryFileError, match=r'prior\.npz: expected an npz with weights'):
+        load_pose_prior(path)
+
+
+def test_wrong_shapes_are_refused():
+    with pytest.raises(LibraryFileError, match='69 coordinates'):
+        PosePrior(np.ones(1), np.zeros((1, 68)), np.zeros((1, 68, 2)), np.ones((1, 68)))
