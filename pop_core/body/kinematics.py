@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from pop_core.body import skinning_kernels as kernels
 from pop_core.body.model import AttachedPoints, BodyModel, BodyParameters, joint_points
-from pop_core.geometry.rotation import to_rotvec
+from pop_core.geometry.rotation import from_rotvec, to_rotvec
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +32,7 @@ class PosedSkeleton:
 def pose_skeleton(model: BodyModel, parameters: BodyParameters) -> PosedSkeleton:
     """Return the posed tree of a body."""
     rotvecs = np.vstack([parameters.global_orient, parameters.body_pose])
-    R_local = kernels.rotation_matrices(rotvecs)
+    R_local = from_rotvec(rotvecs)
     rest_joints = model.joint_template + model.joint_shapedirs @ parameters.betas
     G, p = kernels.forward_kinematics(R_local, rest_joints, model.parents)
     return PosedSkeleton(R_local, rest_joints, G, p)
@@ -81,7 +81,7 @@ def increment(
     parameters: BodyParameters, step: Float[np.ndarray, 'x'], skeleton: PosedSkeleton
 ) -> BodyParameters:
     """Return parameters moved by a step, rotations turned from the left in their parent's frame."""
-    turned = kernels.rotation_matrices(step[3:75].reshape(24, 3)) @ skeleton.R_local
+    turned = from_rotvec(step[3:75].reshape(24, 3)) @ skeleton.R_local
     rotvecs = to_rotvec(turned)
     return BodyParameters(
         transl=parameters.transl + step[:3],

@@ -12,27 +12,6 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def rotation_matrices(rotvecs):
-    """Return rotation matrices (n,3,3) of rotation vectors (n,3) [rad] (Rodrigues)."""
-    out = np.empty((rotvecs.shape[0], 3, 3))
-    for i in range(rotvecs.shape[0]):
-        x, y, z = rotvecs[i, 0], rotvecs[i, 1], rotvecs[i, 2]
-        angle2 = x * x + y * y + z * z
-        angle = np.sqrt(angle2)
-        if angle < 1e-8:
-            a, b, c = 1.0, 0.5, 1.0
-        else:
-            a, b, c = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle2, np.cos(angle)
-        out[i, 0, 0] = c + b * x * x if angle >= 1e-8 else 1.0
-        out[i, 1, 1] = c + b * y * y if angle >= 1e-8 else 1.0
-        out[i, 2, 2] = c + b * z * z if angle >= 1e-8 else 1.0
-        out[i, 0, 1], out[i, 1, 0] = b * x * y - a * z, b * x * y + a * z
-        out[i, 0, 2], out[i, 2, 0] = b * x * z + a * y, b * x * z - a * y
-        out[i, 1, 2], out[i, 2, 1] = b * y * z - a * x, b * y * z + a * x
-    return out
-
-
-@njit(cache=True, nogil=True)
 def forward_kinematics(R_local, rest_joints, parents):
     """Return global rotations G (24,3,3) and joint positions p (24,3), root at its rest place."""
     n = rest_joints.shape[0]

@@ -17,9 +17,9 @@ from pop_core.fitting.correspondence import (
     thin_points,
 )
 from pop_core.fitting.depth_consistency import (
+    HidingPlaces,
     Visibility,
     depth_energy,
-    find_hiding_places,
     free_space_pairs,
     see_body,
 )
@@ -162,10 +162,8 @@ class BodyFitter:
                 segment = self._segment(visibility, observation)
             pairs = self._pairs(hypothesis.state, observation, visibility, segment, scale_m)
             if free_space and self.config.free_space:
-                places = find_hiding_places(
-                    observation, segment, hypothesis.state.vertices[:, 2])
-                pairs = join_pairs(
-                    [pairs, free_space_pairs(hypothesis.state, observation, visibility, places)])
+                places = HidingPlaces(observation, segment, hypothesis.state.vertices[:, 2])
+                pairs = join_pairs([pairs, free_space_pairs(hypothesis.state, visibility, places)])
             # The surface knows better than keypoints; they stay as a stability penalty (Eq. 2).
             weights = self._weights(1.0, joints=min(1.0, scale_m / 0.10))
             active = self._active(pose=True, betas=free_space or k >= 2)
@@ -200,8 +198,8 @@ class BodyFitter:
             segment = self._segment(visibility, observation)
             pairs = self._pairs(state, observation, visibility, segment, LATE_SCALES_M[-1])
             if self.config.free_space:
-                places = find_hiding_places(observation, segment, state.vertices[:, 2])
-                free = free_space_pairs(state, observation, visibility, places)
+                places = HidingPlaces(observation, segment, state.vertices[:, 2])
+                free = free_space_pairs(state, visibility, places)
                 thinner = self._coarse_share()
                 pairs = join_pairs([pairs, replace(free, weight=free.weight * thinner)])
             weights = self._weights(1.0, joints=LATE_SCALES_M[-1] / 0.10)

@@ -81,40 +81,47 @@ def see_body(state: BodyState, observation: Observation) -> Visibility:
     return Visibility(sight, gap, rendered)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class HidingPlaces:
-    """For slices of depth: where something as near as the slice, or the person, covers a pixel.
+    """Where a body can hide, for slices of depth: over the person, something nearer, or nothing.
 
-    Args:
-        slices_m: Depth of each slice [m], rising.
-        nearest: For each slice and pixel the nearest pixel (u, v) that can hide a body there.
-        exists: Whether a slice has any such pixel.
+    Each slice is computed when a vertex first asks for it: most bodies need none.
     """
 
-    slices_m: Float[np.ndarray, 'd']
-    nearest: Int[np.ndarray, 'd h w 2']
-    exists: Bool[np.ndarray, 'd']
+    def __init__(
+        self, observation: Observation, segment: Bool[np.ndarray, 'h w'], z: Float[np.ndarray, 'n']
+    ) -> None:
+        """Prepare slices for a body whose vertices lie at depths z [m]."""
+        self.observation, self.segment = observation, segment
+        self.slices_m = np.linspace(z.min(), z.max(), DEPTH_SLICES)
+        self._nearest: dict[int, Int[np.ndarray, 'h w 2']] = {}
 
+    def targets(
+        self, points: Float[np.ndarray, 'n 3']
+    ) -> tuple[Float[np.ndarray, 'n 3'], Bool[np.ndarray, 'n']]:
+        """Return the nearest hidden place at each point's depth [m], and whether there is one."""
+        _, uv = self.observation.depth_at(points)
+        # The slice before a point's depth is the cautious one: what hides there, hides it.
+        which = np.searchsorted(self.slices_m, points[:, 2], side='right') - 1
+        which = np.clip(which, 0, DEPTH_SLICES - 1)
+        pixel = np.full((len(points), 2), -1)
+        for k in np.unique(which):
+            rows = which == k
+            pixel[rows] = self._slice(int(k))[uv[rows, 1], uv[rows, 0]]
+        known = pixel[:, 0] >= 0
+        ray = self.observation.rays[pixel[:, 1], pixel[:, 0]]
+        return np.column_stack([ray * points[:, 2:], points[:, 2]]), known
 
-def find_hiding_places(
-    observation: Observation, segment: Bool[np.ndarray, 'h w'], z: Float[np.ndarray, 'n']
-) -> HidingPlaces:
-    """Return the hiding places of a body whose vertices lie at depths z [m].
-
-    A pixel hides a body when it shows the body itself, something nearer, or nothing at all.
-    """
-    slices = np.linspace(z.min(), z.max(), DEPTH_SLICES)
-    nearest, exists = [], []
-    with np.errstate(invalid='ignore'):
-        for depth in slices:
-            able = segment | (observation.depth_m < depth) | np.isnan(observation.depth_m)
-            nearest.append(nearest_of(able)[1])
-            exists.append(bool(able.any()))
-    return HidingPlaces(slices, np.stack(nearest), np.array(exists))
+    def _slice(self, k: int) -> Int[np.ndarray, 'h w 2']:
+        if k not in self._nearest:
+            depth_m = self.observation.depth_m
+            with np.errstate(invalid='ignore'):
+                able = self.segment | (depth_m < self.slices_m[k]) | np.isnan(depth_m)
+            self._nearest[k] = nearest_of(able)
+        return self._nearest[k]
 
 
 def free_space_pairs(
-    state: BodyState, observation: Observation, visibility: Visibility, places: HidingPlaces
+    state: BodyState, visibility: Visibility, places: HidingPlaces
 ) -> Pairs:
     """Return where vertices that the sensor saw through should go (E_free).
 
@@ -129,7 +136,7 @@ def free_space_pairs(
     ray = points / np.linalg.norm(points, axis=1, keepdims=True)
     behind = points * (1 + visibility.gap_m[small] / points[:, 2])[:, None]
     along = Pairs(small, ray, behind, np.full(len(small), 0.5 / FREE_SIGMA_M**2))
-    target, known = _hiding_targets(state, observation, places, large)
+    target, known = places.targets(state.vertices[large])
     large, target = large[known], target[known]
     pull = np.linalg.norm(state.vertices[large] - target, axis=1)
     weight = 0.25 / FREE_SIGMA_M**2 * geman_mcclure_weight(pull, 0.3)
@@ -171,21 +178,3 @@ def free_space_violation(
     covered = rendered.covered & np.isfinite(depth_m)
     violating = rendered.depth_m[covered] < depth_m[covered] - limit_m
     return float(violating.mean()) if violating.size else 0.0
-
-
-def _hiding_targets(
-    state: BodyState,
-    observation: Observation,
-    places: HidingPlaces,
-    vertex: Int[np.ndarray, 'n'],
-) -> tuple[Float[np.ndarray, 'n 3'], Bool[np.ndarray, 'n']]:
-    """Return the point at each vertex's depth over the nearest pixel that can hide it."""
-    points = state.vertices[vertex]
-    _, uv = observation.depth_at(points)
-    # The slice at or before the vertex's depth is the cautious one: what it allows, hides.
-    which = np.searchsorted(places.slices_m, points[:, 2], side='right') - 1
-    which = np.clip(which, 0, len(places.slices_m) - 1)
-    pixel = places.nearest[which, uv[:, 1], uv[:, 0]]
-    ray = observation.rays[pixel[:, 1], pixel[:, 0]]
-    target = np.column_stack([ray * points[:, 2:], points[:, 2]])
-    return target, places.exists[which]

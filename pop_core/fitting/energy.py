@@ -73,17 +73,17 @@ class BodyEnergy:
         """Freeze robust weights at `state`."""
         self.observation, self.belief, self.weights, self.pairs = (
             observation, belief, weights, pairs)
-        lifted, camera = observation.window_joints, observation.camera
+        lifted, rays = observation.lifted, observation.keypoint_rays
         self.joint_weight = weights.joints * joint_weight(state, lifted, weights.robust_m)
-        self.ray_weight = weights.joints * ray_weight(state, lifted, camera)
+        self.ray_weight = weights.joints * ray_weight(state, rays)
 
     def residuals(self, state: BodyState, jacobian: bool) -> list[Residual]:  # noqa: FBT001
         """Return every block of residuals at a state."""
-        lifted, camera = self.observation.window_joints, self.observation.camera
+        lifted, rays = self.observation.lifted, self.observation.keypoint_rays
         belief, weights = self.belief, self.weights
         blocks = [
             joint_residual(state, lifted, self.joint_weight, jacobian=jacobian),
-            ray_residual(state, lifted, camera, self.ray_weight, jacobian=jacobian),
+            ray_residual(state, rays, self.ray_weight, jacobian=jacobian),
             pose_prior_residual(state, belief.prior, weights.prior, jacobian=jacobian),
             conditional_prior_residual(
                 state, belief.pose, belief.sigma_rad, weights.neighbours, jacobian=jacobian),

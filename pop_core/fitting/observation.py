@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -13,6 +13,7 @@ from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.rgbd import RgbdFrame, flying_pixels
 
 REACH_M = 1.25  # half size of the window around a person: a tall one with a raised arm fits
+RAY_SIGMA_PX = 12.0  # a detector's guess of a hidden joint is rarely better
 WINDOW_PX = 240  # longest side of the thinned window
 
 
@@ -42,6 +43,23 @@ class Window:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class KeypointRays:
+    """The rays of keypoints that were detected but could not be lifted.
+
+    Args:
+        joint: Shared joint of each ray.
+        across: Two unit vectors across each ray.
+        score: Confidence 0..1 of each keypoint.
+        sigma: Standard deviation as a slope: metres per metre of depth.
+    """
+
+    joint: Int[np.ndarray, 'n']
+    across: Float[np.ndarray, 'n 2 3']
+    score: Float[np.ndarray, 'n']
+    sigma: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Observation:
     """One person's window of the depth image, and the joints lifted in it.
 
@@ -52,7 +70,8 @@ class Observation:
         rays: (x/z, y/z) of every pixel.
         own: Pixels that may show this person: measured, not flying, not another person's.
         labels: Body part per pixel as a joint index, -1 where unknown; None without a part map.
-        window_joints: Lifted joints of the person, their pixels those of the window.
+        lifted: Lifted joints of the person.
+        keypoint_rays: Rays of the keypoints that were not lifted.
     """
 
     window: Window
@@ -61,7 +80,8 @@ class Observation:
     rays: Float[np.ndarray, 'h w 2']
     own: Bool[np.ndarray, 'h w']
     labels: Int[np.ndarray, 'h w'] | None
-    window_joints: LiftedJoints
+    lifted: LiftedJoints
+    keypoint_rays: KeypointRays
 
     def points(self, mask: Bool[np.ndarray, 'h w']) -> Float[np.ndarray, 'n 3']:
         """Return the measured points of a mask [m], camera frame, in row order."""
@@ -109,9 +129,20 @@ def observe(
     own = np.isfinite(depth_m) & ~window.cut(others) & ~window.cut(flying_pixels(frame.depth_m))
     parts = None if labels is None else window.cut(labels)
     rays = camera.ray_grid()
-    pixels = (lifted.keypoints_px - [window.left, window.top]) / window.stride
-    window_joints = replace(lifted, keypoints_px=pixels)
-    return Observation(window, camera, depth_m, rays, own, parts, window_joints)
+    rays_of_keypoints = keypoint_rays(lifted, frame.camera)
+    return Observation(window, camera, depth_m, rays, own, parts, lifted, rays_of_keypoints)
+
+
+def keypoint_rays(lifted: LiftedJoints, camera: Camera) -> KeypointRays:
+    """Return the rays of keypoints with a pixel but no position."""
+    known = np.isfinite(lifted.keypoints_px).all(axis=1) & (lifted.scores > 0)
+    joint = np.flatnonzero(known & ~lifted.lifted)
+    ray = camera.unproject(lifted.keypoints_px[joint], np.ones(len(joint)))
+    unit = ray / np.linalg.norm(ray, axis=1, keepdims=True)
+    first = np.cross(unit, [0.0, 1.0, 0.0])
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    across = np.stack([first, np.cross(unit, first)], axis=1)
+    return KeypointRays(joint, across, lifted.scores[joint], RAY_SIGMA_PX / camera.fx)
 
 
 def person_window(lifted: LiftedJoints, camera: Camera) -> Window:
@@ -130,18 +161,16 @@ def person_window(lifted: LiftedJoints, camera: Camera) -> Window:
     return Window(min(left, camera.width - 1), min(top, camera.height - 1), width, height, stride)
 
 
-def nearest_of(
-    mask: Bool[np.ndarray, 'h w'],
-) -> tuple[Float32[np.ndarray, 'h w'], Int[np.ndarray, 'h w 2']]:
-    """Return the distance [px] to the nearest pixel of a mask, and that pixel (u, v)."""
-    distance, label = cv2.distanceTransformWithLabels(
+def nearest_of(mask: Bool[np.ndarray, 'h w']) -> Int[np.ndarray, 'h w 2']:
+    """Return the pixel (u, v) of a mask nearest to each pixel; (-1, -1) when the mask is empty."""
+    if not mask.any():
+        return np.full((*mask.shape, 2), -1)
+    _, label = cv2.distanceTransformWithLabels(
         (~mask).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
     v, u = np.nonzero(mask)
-    if len(v) == 0:
-        return distance, np.zeros((*mask.shape, 2), dtype=np.int64)
     pixel_of_label = np.zeros((len(v) + 1, 2), dtype=np.int64)
     pixel_of_label[label[v, u]] = np.column_stack([u, v])
-    return distance, pixel_of_label[label]
+    return pixel_of_label[label]
 
 
 def _clamp(value: float, size: int) -> int:

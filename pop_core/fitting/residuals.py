@@ -13,11 +13,10 @@ from jaxtyping import Float, Int
 
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.levenberg_marquardt import Residual
+from pop_core.fitting.observation import KeypointRays
 from pop_core.fitting.robust_loss import geman_mcclure_weight
-from pop_core.geometry.camera import Camera
 from pop_core.keypoints.lifted_joints import LiftedJoints
 
-RAY_SIGMA_PX = 12.0  # a detector's guess of a hidden joint is rarely better
 
 
 def joint_weight(
@@ -39,46 +38,29 @@ def joint_residual(
     return Residual(difference, J, np.repeat(weight[rows], 3))
 
 
-def ray_weight(
-    state: BodyState, lifted: LiftedJoints, camera: Camera
-) -> Float[np.ndarray, 's']:
+def ray_weight(state: BodyState, rays: KeypointRays) -> Float[np.ndarray, 's']:
     """Return the weight 1/sigma^2 of keypoints that have a pixel but no depth, zero elsewhere.
 
     A detector's pixel of a hidden joint fixes its direction though nothing fixes its distance.
     """
-    known = np.isfinite(lifted.keypoints_px).all(axis=1) & ~lifted.lifted
-    sigma_m = RAY_SIGMA_PX / camera.fx * np.maximum(state.landmarks[:, 2], 0.3)
-    across = _across(lifted, camera)
-    distance = np.linalg.norm(np.einsum('nkc,nc->nk', across, state.landmarks), axis=1)
-    robust = geman_mcclure_weight(distance, 0.25)
-    return np.where(known, np.nan_to_num(lifted.scores) * robust / sigma_m**2, 0.0)
+    weight = np.zeros(len(state.landmarks))
+    points = state.landmarks[rays.joint]
+    sigma_m = rays.sigma * np.maximum(points[:, 2], 0.3)
+    distance = np.linalg.norm(np.einsum('nkc,nc->nk', rays.across, points), axis=1)
+    weight[rays.joint] = rays.score * geman_mcclure_weight(distance, 0.25) / sigma_m**2
+    return weight
 
 
 def ray_residual(
-    state: BodyState,
-    lifted: LiftedJoints,
-    camera: Camera,
-    weight: Float[np.ndarray, 's'],
-    *,
-    jacobian: bool,
+    state: BodyState, rays: KeypointRays, weight: Float[np.ndarray, 's'], *, jacobian: bool
 ) -> Residual:
-    """Return the distance of shared points to the rays of their keypoints, in two directions.
-
-    Args:
-        state: Body.
-        lifted: Keypoints.
-        camera: Pinhole whose pixels `lifted.keypoints_px` are.
-        weight: Weight per joint; joints of weight zero are left out.
-        jacobian: Whether to compute the derivative.
-    """
-    rows = np.flatnonzero(weight > 0)
-    across = _across(lifted, camera)[rows]
-    distance = np.einsum('nkc,nc->nk', across, state.landmarks[rows])
+    """Return the distance of shared points to the rays of their keypoints, in two directions."""
+    distance = np.einsum('nkc,nc->nk', rays.across, state.landmarks[rays.joint])
     J = None
     if jacobian:
-        J = np.einsum('nkc,ncx->nkx', across, state.landmark_jacobian()[rows])
-        J = J.reshape(2 * len(rows), state.body.size)
-    return Residual(distance.reshape(-1), J, np.repeat(weight[rows], 2))
+        J = np.einsum('nkc,ncx->nkx', rays.across, state.landmark_jacobian()[rays.joint])
+        J = J.reshape(2 * len(rays.joint), state.body.size)
+    return Residual(distance.reshape(-1), J, np.repeat(weight[rays.joint], 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,14 +104,3 @@ def pair_residual(state: BodyState, pairs: Pairs, *, jacobian: bool) -> Residual
     r = np.einsum('nc,nc->n', pairs.direction, offset)
     J = state.directional_jacobian(pairs.vertex, pairs.direction) if jacobian else None
     return Residual(r, J, pairs.weight)
-
-
-def _across(lifted: LiftedJoints, camera: Camera) -> Float[np.ndarray, 's 2 3']:
-    """Return two unit vectors across the ray of each keypoint; undetected ones look ahead."""
-    known = np.isfinite(lifted.keypoints_px).all(axis=1)
-    uv = np.where(known[:, None], lifted.keypoints_px, [camera.cx, camera.cy])
-    ray = camera.unproject(uv, np.ones(len(uv)))
-    unit = ray / np.linalg.norm(ray, axis=1, keepdims=True)
-    first = np.cross(unit, [0.0, 1.0, 0.0])
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.stack([first, np.cross(unit, first)], axis=1)

@@ -6,17 +6,19 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
+from pop_core.geometry import rotation_kernels as kernels
+
 
 def from_rotvec(rotvec: Float[np.ndarray, '*n 3']) -> Float[np.ndarray, '*n 3 3']:
     """Return rotation matrices of rotation vectors [rad] (Rodrigues)."""
-    flat = np.asarray(rotvec, dtype=np.float64).reshape(-1, 3)
-    return Rotation.from_rotvec(flat).as_matrix().reshape(*rotvec.shape, 3)
+    flat = np.ascontiguousarray(rotvec, dtype=np.float64).reshape(-1, 3)
+    return kernels.rotation_matrices(flat).reshape(*rotvec.shape, 3)
 
 
 def to_rotvec(matrix: Float[np.ndarray, '*n 3 3']) -> Float[np.ndarray, '*n 3']:
     """Return rotation vectors [rad], of angle at most pi, of rotation matrices."""
-    flat = np.asarray(matrix, dtype=np.float64).reshape(-1, 3, 3)
-    return Rotation.from_matrix(flat).as_rotvec().reshape(matrix.shape[:-1])
+    flat = np.ascontiguousarray(matrix, dtype=np.float64).reshape(-1, 3, 3)
+    return kernels.rotation_vectors(flat).reshape(matrix.shape[:-1])
 
 
 def to_quat_xyzw(matrix: Float[np.ndarray, '*n 3 3']) -> Float[np.ndarray, '*n 4']:
