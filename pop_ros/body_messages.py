@@ -1,0 +1,86 @@
+"""All messages of one frame's bodies; used by the node and by `pop replay --every-frame`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PoseArray
+from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import Marker
+
+from pop_core.body.model import BodyModel
+from pop_core.estimate import BodyEstimate, FrameResult
+from pop_core.rgbd import RgbdFrame
+from pop_ros import to_messages
+from pop_ros.cdr import MarkerTemplate
+from pop_ros.node_config import MeshConfig
+from pop_ros.person_ids import PersonIds
+
+MESH, JOINTS, CLOUD = 'mesh', 'joints', 'cloud'
+OUTPUT_TYPES = {MESH: Marker, JOINTS: PoseArray, CLOUD: PointCloud2}
+MAX_TEMPLATES = 64  # ids never return; templates of people who left are of no use
+
+# A topic's name without the node's, and a message or its serialised bytes.
+Output = tuple[str, Any]
+
+
+class BodyMessages:
+    """Turns results into messages and remembers who was there in the frame before."""
+
+    def __init__(self, model: BodyModel, mesh: MeshConfig) -> None:
+        """Prepare messages of a body model's meshes."""
+        self._model, self._mesh = model, mesh
+        self._ids = PersonIds()
+        self._shown: set[int] = set()
+        self._templates: dict[tuple[int, str], MarkerTemplate] = {}
+
+    def build(
+        self, result: FrameResult, frame: RgbdFrame, frame_id: str,
+        wanted: Collection[str] = tuple(OUTPUT_TYPES),
+    ) -> list[Output]:
+        """Return the messages of a frame for the wanted topics.
+
+        A frame without people gives messages only when somebody has just left: removals, and one
+        empty set of joints and points.
+        """
+        bodies = result.bodies
+        ids = self._ids.assign(np.array([b.joints[0] for b in bodies]).reshape(-1, 3))
+        gone, self._shown = self._shown - set(ids), set(ids)
+        if not bodies and not gone:
+            return []
+        header = to_messages.make_header(frame.stamp_ns, frame_id)
+        makers: dict[str, Callable[[], list[Any]]] = {
+            MESH: lambda: self._meshes(result, ids, gone, frame.stamp_ns, frame_id),
+            JOINTS: lambda: [to_messages.joints_message(bodies, header)],
+            CLOUD: lambda: [to_messages.cloud_message(frame, bodies, ids, header)],
+        }
+        return [(name, m) for name, make in makers.items() if name in wanted for m in make()]
+
+    def _meshes(
+        self, result: FrameResult, ids: list[int], gone: set[int], stamp_ns: int, frame_id: str
+    ) -> list[Any]:
+        messages: list[Any] = [
+            to_messages.delete_marker(number, stamp_ns, frame_id) for number in sorted(gone)]
+        if self._mesh.detail == 'off':
+            return messages
+        for body, number in zip(result.bodies, ids, strict=True):
+            template = self._template(number, frame_id)
+            messages.append(template.message(stamp_ns, self._triangles(body)))
+        return messages
+
+    def _triangles(self, body: BodyEstimate) -> np.ndarray:
+        if self._mesh.detail == 'reduced':
+            coarse = body.vertices[self._model.fit_vertices]
+            return to_messages.triangle_points(coarse, self._model.fit_faces)
+        return to_messages.triangle_points(body.vertices, self._model.f)
+
+    def _template(self, person_id: int, frame_id: str) -> MarkerTemplate:
+        key = (person_id, frame_id)
+        if key not in self._templates:
+            if len(self._templates) >= MAX_TEMPLATES:
+                self._templates.clear()
+            marker = to_messages.mesh_marker(person_id, frame_id, self._mesh.lifetime_s)
+            self._templates[key] = MarkerTemplate(marker)
+        return self._templates[key]

@@ -1,0 +1,163 @@
+"""The three inputs of the node: subscribed as offered, paired, handed on with the CameraInfo."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
+from sensor_msgs.msg import CameraInfo, Image
+
+from pop_ros.explanation import TopicReport
+from pop_ros.from_messages import stamp_ns
+from pop_ros.pairing import FramePairer, Pair
+from pop_ros.qos import describe_qos, matched_qos, same_qos
+
+COLOR, DEPTH, INFO = 'color/image', 'depth/image', 'color/camera_info'
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RgbdMessages:
+    """The messages of one frame.
+
+    Args:
+        color: sensor_msgs/Image of colour.
+        depth: sensor_msgs/Image of depth.
+        info: sensor_msgs/CameraInfo of the colour camera.
+        arrival_s: Steady time at which the pair was complete [s].
+    """
+
+    color: Image
+    depth: Image
+    info: CameraInfo
+    arrival_s: float
+
+
+class InputTopic:
+    """One topic whose subscription follows what its publishers offer."""
+
+    def __init__(
+        self, node: Node, role: str, kind: type, on_message: Callable[[Any], None],
+        *, latched: bool = False,
+    ) -> None:
+        """Prepare the topic `role` (relative name) of a message type, not subscribed yet."""
+        self.role, self.topic = role, node.resolve_topic_name(role)
+        self._node, self._kind, self._latched = node, kind, latched
+        self._on_message = on_message
+        self._subscription: Subscription | None = None
+        self._profile: QoSProfile | None = None
+        self._count = self._counted = 0
+        self._counted_at = time.monotonic()
+        self._last_stamp_ns: int | None = None
+
+    def follow(self, reliability: str) -> None:
+        """Subscribe as the present publishers offer; change it when they change."""
+        offers = [o.qos_profile for o in self._node.get_publishers_info_by_topic(self.topic)]
+        if not offers:
+            return
+        profile = matched_qos(offers, latched=self._latched, reliability=reliability)
+        if self._profile is not None and same_qos(profile, self._profile):
+            return
+        self.leave()
+        self._profile = profile
+        self._subscription = self._node.create_subscription(
+            self._kind, self.topic, self._receive, profile)
+        self._node.get_logger().info(
+            f'{self.role}: subscribed {self.topic} ({describe_qos(profile)})')
+
+    def leave(self) -> None:
+        """Unsubscribe."""
+        if self._subscription is not None:
+            self._node.destroy_subscription(self._subscription)
+        self._subscription = self._profile = None
+
+    def report(self) -> TopicReport:
+        """Return counts and offers; the rate is that since the report before."""
+        now = time.monotonic()
+        rate_hz = (self._count - self._counted) / max(now - self._counted_at, 1e-3)
+        self._counted, self._counted_at = self._count, now
+        offers = self._node.get_publishers_info_by_topic(self.topic)
+        texts = tuple(f'{o.node_name} ({describe_qos(o.qos_profile)})' for o in offers)
+        others = () if texts else self._same_type()
+        return TopicReport(
+            self.role, self.topic, texts, self._count, rate_hz, self._last_stamp_ns, others)
+
+    def _same_type(self) -> tuple[str, ...]:
+        name = f'{self._kind.__module__.split(".")[0]}/msg/{self._kind.__name__}'
+        known = self._node.get_topic_names_and_types()
+        return tuple(topic for topic, types in known if name in types and topic != self.topic)
+
+    def _receive(self, message: Any) -> None:
+        self._count += 1
+        self._last_stamp_ns = stamp_ns(message.header)
+        self._on_message(message)
+
+
+class RgbdInputs:
+    """Pairs colour and depth and adds the latest CameraInfo, however it is published."""
+
+    def __init__(
+        self, node: Node, slop_s: float, on_frame: Callable[[RgbdMessages], None]
+    ) -> None:
+        """Prepare the inputs; nothing is subscribed before `follow`."""
+        self.pairer: FramePairer[Image] = FramePairer(round(slop_s * 1e9))
+        self._on_frame = on_frame
+        self._info: CameraInfo | None = None
+        self._without_info: Pair[Image] | None = None
+        self.last_frame_s = time.monotonic()
+        self.topics = (
+            InputTopic(node, COLOR, Image, self._on_color),
+            InputTopic(node, DEPTH, Image, self._on_depth),
+            InputTopic(node, INFO, CameraInfo, self._on_info, latched=True),
+        )
+
+    def follow(self, reliability: str) -> None:
+        """Subscribe what is published."""
+        for topic in self.topics:
+            topic.follow(reliability)
+
+    def leave(self) -> None:
+        """Unsubscribe everything and forget pending images."""
+        for topic in self.topics:
+            topic.leave()
+        self.reset(self.pairer.slop_ns / 1e9)
+
+    def reset(self, slop_s: float) -> None:
+        """Start pairing anew; the CameraInfo stays."""
+        self.pairer = FramePairer(round(slop_s * 1e9))
+        self._without_info = None
+        self.last_frame_s = time.monotonic()
+
+    def poll(self) -> None:
+        """Hand on pairs that have waited long enough."""
+        self._hand_on(self.pairer.poll(time.monotonic_ns()))
+
+    def reports(self) -> list[TopicReport]:
+        """Return the state of the three topics."""
+        return [topic.report() for topic in self.topics]
+
+    def _on_color(self, message: Image) -> None:
+        now_ns = time.monotonic_ns()
+        self._hand_on(self.pairer.add_color(stamp_ns(message.header), message, now_ns))
+
+    def _on_depth(self, message: Image) -> None:
+        now_ns = time.monotonic_ns()
+        self._hand_on(self.pairer.add_depth(stamp_ns(message.header), message, now_ns))
+
+    def _on_info(self, message: CameraInfo) -> None:
+        self._info = message
+        if self._without_info is not None:
+            pair, self._without_info = self._without_info, None
+            self._hand_on([pair])
+
+    def _hand_on(self, pairs: list[Pair[Image]]) -> None:
+        for pair in pairs:
+            if self._info is None:
+                self._without_info = pair
+                continue
+            self.last_frame_s = time.monotonic()
+            self._on_frame(RgbdMessages(pair.color, pair.depth, self._info, self.last_frame_s))

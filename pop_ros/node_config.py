@@ -1,0 +1,60 @@
+"""Settings of the node itself, declared like those of the pipeline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from pop_core.errors import SettingError
+from pop_core.settings import setting
+
+RELIABILITIES = ('auto', 'reliable', 'best_effort')
+MESH_DETAILS = ('full', 'reduced', 'off')
+
+
+@dataclass(frozen=True, slots=True)
+class SyncConfig:
+    """How colour and depth are paired."""
+
+    slop_s: float = setting(
+        0.03, unit='s', minimum=0.0, maximum=10.0,
+        about='Largest difference of the stamps of a colour image and its depth image.')
+
+
+@dataclass(frozen=True, slots=True)
+class InputConfig:
+    """How inputs are subscribed."""
+
+    reliability: str = setting(
+        'auto', about='Reliability asked of publishers: auto (as offered), reliable, best_effort.')
+
+
+@dataclass(frozen=True, slots=True)
+class MeshConfig:
+    """What is published on ~/mesh."""
+
+    detail: str = setting(
+        'full', about='Mesh to publish: full, reduced (fits default shared memory), off.')
+    lifetime_s: float = setting(
+        0.0, unit='s', minimum=0.0, maximum=3600.0,
+        about='Time after which rviz removes a mesh that is not renewed; 0 keeps it.')
+
+
+@dataclass(frozen=True, slots=True)
+class NodeConfig:
+    """Settings of the node around the pipeline."""
+
+    sync: SyncConfig = field(default_factory=SyncConfig)
+    input: InputConfig = field(default_factory=InputConfig)
+    mesh: MeshConfig = field(default_factory=MeshConfig)
+    lazy: bool = setting(
+        True, about='Work only while somebody subscribes to an output.')
+    enabled: bool = setting(True, about='Whether frames are processed.')
+
+    def __post_init__(self) -> None:
+        _check_choice('input.reliability', self.input.reliability, RELIABILITIES)
+        _check_choice('mesh.detail', self.mesh.detail, MESH_DETAILS)
+
+
+def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise SettingError(f'{name}: expected one of {", ".join(choices)}, found {value!r}')

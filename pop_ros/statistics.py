@@ -1,0 +1,100 @@
+"""What the node has done: frames, drops by reason, and times; written by two threads."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import Counter, deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+REMINDER_S = 5.0  # how often the same drop is said again
+WINDOW = 100  # latest frames that rates and percentiles are taken from
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """A consistent copy of the counts.
+
+    Args:
+        pairs: Pairs handed to the worker.
+        frames: Frames fitted.
+        people: People fitted in all frames.
+        latest_people: People in the latest frame.
+        drops: Pairs that gave no frame, by reason.
+        latest_drop: The latest drop in words.
+        latency_ms: Latest times from arrival of a pair to publishing [ms].
+        age_ms: Latest ages of the image stamp at publishing [ms].
+        step_ms: Latest time of every step of the pipeline [ms].
+    """
+
+    pairs: int
+    frames: int
+    people: int
+    latest_people: int
+    drops: Mapping[str, int]
+    latest_drop: str
+    latency_ms: tuple[float, ...]
+    age_ms: tuple[float, ...]
+    step_ms: Mapping[str, tuple[float, ...]]
+
+    @property
+    def pending(self) -> int:
+        """Return the pairs that are neither fitted nor dropped yet."""
+        return self.pairs - self.frames - sum(self.drops.values())
+
+
+@dataclass(slots=True)
+class NodeStatistics:
+    """Counts that the callbacks and the worker write."""
+
+    pairs: int = 0
+    frames: int = 0
+    people: int = 0
+    latest_people: int = 0
+    latest_drop: str = ''
+    drops: Counter[str] = field(default_factory=Counter)
+    _latency_ms: deque[float] = field(default_factory=lambda: deque(maxlen=WINDOW))
+    _age_ms: deque[float] = field(default_factory=lambda: deque(maxlen=WINDOW))
+    _step_ms: dict[str, deque[float]] = field(default_factory=dict)
+    _said: dict[str, float] = field(default_factory=dict)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def add_pair(self) -> None:
+        """Count a pair handed to the worker."""
+        with self._lock:
+            self.pairs += 1
+
+    def add_frame(
+        self, people: int, latency_ms: float, age_ms: float, step_ms: Mapping[str, float]
+    ) -> None:
+        """Count a fitted frame and its times [ms]."""
+        with self._lock:
+            self.frames += 1
+            self.people += people
+            self.latest_people = people
+            self._latency_ms.append(latency_ms)
+            self._age_ms.append(age_ms)
+            for name, value in step_ms.items():
+                self._step_ms.setdefault(name, deque(maxlen=WINDOW)).append(value)
+
+    def add_drop(self, reason: str, text: str) -> bool:
+        """Count a dropped pair; return whether it is time to say so (first, then every 5 s)."""
+        now = time.monotonic()
+        with self._lock:
+            self.drops[reason] += 1
+            self.latest_drop = text
+            due = now - self._said.get(reason, -np.inf) > REMINDER_S
+            if due:
+                self._said[reason] = now
+            return bool(due)
+
+    def snapshot(self) -> Snapshot:
+        """Return a consistent copy."""
+        with self._lock:
+            return Snapshot(
+                self.pairs, self.frames, self.people, self.latest_people, dict(self.drops),
+                self.latest_drop, tuple(self._latency_ms), tuple(self._age_ms),
+                {name: tuple(values) for name, values in self._step_ms.items()})
