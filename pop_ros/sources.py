@@ -1,0 +1,92 @@
+"""Where keypoints come from, and the one place where a pipeline is put together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pop_core.errors import PopError
+
+if TYPE_CHECKING:
+    from pop_core.config import PipelineConfig
+    from pop_core.keypoints.detection import KeypointDetector
+    from pop_core.pipeline import BodyPipeline
+
+SOURCES = "'json' (OpenPose files), or the path of an ONNX network"
+Progress = Callable[[float, str], None]
+
+
+class SourceError(PopError):
+    """A keypoint source that does not exist or lacks what it needs."""
+
+
+def make_detector(
+    spec: str, keypoints_dir: Path | None = None, decoder: str | None = None
+) -> KeypointDetector:
+    """Return the keypoint source that a user named.
+
+    Args:
+        spec: 'json' or the path of an ONNX network.
+        keypoints_dir: Folder of `<stamp_ns>.json` files; needed by 'json'.
+        decoder: Decoder of the network's outputs where they do not tell; None chooses.
+
+    Raises:
+        SourceError: If there is no such source, or a folder is missing.
+        NetworkShapeError: If the network fits no decoder.
+    """
+    if spec == 'json':
+        return _json_detector(keypoints_dir)
+    if spec == 'depth':
+        raise SourceError(
+            f'keypoints: expected {SOURCES}, found depth: this version has no embedded network')
+    return _network_detector(Path(spec), decoder)
+
+
+def make_pipeline(
+    detector: KeypointDetector,
+    config: PipelineConfig | None = None,
+    body_file: Path | None = None,
+    library_file: Path | None = None,
+    progress: Progress | None = None,
+) -> BodyPipeline:
+    """Return a pipeline with its body model and pose library loaded.
+
+    Args:
+        detector: Keypoint source.
+        config: Settings; None takes the defaults.
+        body_file: Body model (.npz) in place of the default body.
+        library_file: Pose library in place of the default one.
+        progress: Called with a share 0..1 and a sentence while a first library is generated.
+
+    Raises:
+        PopError: If a file is damaged or not of its format.
+    """
+    from pop_core.body.default_body import default_body
+    from pop_core.body.model_file import load_body_model
+    from pop_core.pipeline import BodyPipeline
+    from pop_core.retrieval.default_library import default_library
+    from pop_core.retrieval.library_file import load_library
+
+    model = default_body() if body_file is None else load_body_model(body_file)
+    library = default_library(progress) if library_file is None else load_library(library_file)
+    return BodyPipeline(model, library, detector, config)
+
+
+def _json_detector(folder: Path | None) -> KeypointDetector:
+    from pop_core.keypoints.openpose_json import OpenPoseJsonDetector
+
+    if folder is None or not folder.is_dir():
+        found = 'none' if folder is None else f'{folder}, which is no folder'
+        raise SourceError(
+            f'keypoints: expected a folder of <stamp_ns>.json files (--keypoints-dir), '
+            f'found {found}')
+    return OpenPoseJsonDetector(folder)
+
+
+def _network_detector(path: Path, decoder: str | None) -> KeypointDetector:
+    from pop_core.keypoints.onnx_detector import OnnxKeypointDetector
+
+    if path.suffix != '.onnx' or not path.is_file():
+        raise SourceError(f'keypoints: expected {SOURCES}, found {path}, which is no such file')
+    return OnnxKeypointDetector(path, decoder)
