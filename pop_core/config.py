@@ -26,6 +26,8 @@ class PipelineConfig:
     min_support: float = setting(
         0.35, minimum=0.0, maximum=1.0,
         about='Smallest share of the visible body that measured depth must agree with.')
+    use_ground: bool = setting(
+        True, about='Whether the floor is looked for: feet stand on it and never below it.')
     lifting: LiftingConfig = field(default_factory=LiftingConfig)
     retrieval: RetrievalConfig = field(default_factory=RetrievalConfig)
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)

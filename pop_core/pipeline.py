@@ -29,6 +29,7 @@ from pop_core.retrieval.pose_prior import PosePrior, load_pose_prior
 from pop_core.retrieval.retrieve import retrieve
 from pop_core.rgbd import RgbdFrame, undistort_frame
 from pop_core.segmentation.body_segmentation import segment_body
+from pop_core.segmentation.ground import Ground, find_ground
 from pop_core.stopwatch import Stopwatch
 
 SUPPORT_M = 0.08  # measured and rendered depth agree within clothes and a small misfit
@@ -77,13 +78,15 @@ class BodyPipeline:
         with watch.step('lift'):
             lifted = [lift_keypoints(frame, d, self.config.lifting) for d in detections]
         distance_m = [_distance_m(joints) for joints in lifted]
+        with watch.step('ground'):
+            ground = find_ground(frame) if self.config.use_ground else None
         statuses = [self._admit(j, z) for j, z in zip(lifted, distance_m, strict=True)]
         bodies: list[BodyEstimate] = []
         taken = np.zeros(frame.depth_m.shape, dtype=bool)
         for i in np.argsort(distance_m, kind='stable'):
             if statuses[i] is not EstimateStatus.OK or len(bodies) >= self.config.max_people:
                 continue
-            estimate, status = self._fit_person(frame, detections[i], lifted[i], taken, watch)
+            estimate, status = self._fit_person(frame, detections[i], lifted[i], taken, ground, watch)
             statuses[i] = status
             if estimate is not None:
                 bodies.append(estimate)
@@ -96,11 +99,12 @@ class BodyPipeline:
         detection: Detection,
         lifted: LiftedJoints,
         taken: Bool[np.ndarray, 'h w'],
+        ground: Ground | None,
         watch: Stopwatch,
     ) -> tuple[BodyEstimate | None, EstimateStatus]:
         """Retrieve, fit and segment one person."""
         with watch.step('observe'):
-            observation = observe(frame, lifted, taken, detection.part_labels)
+            observation = observe(frame, lifted, taken, ground, detection.part_labels)
         with watch.step('retrieve'):
             candidates = self._retrieve(lifted, observation)
         with watch.step('fit'):
@@ -117,7 +121,11 @@ class BodyPipeline:
         def in_the_open_m(p_camera: Float[np.ndarray, 'n 3']) -> Float[np.ndarray, 'n']:
             """Return how far points stand in front of what the camera measured there."""
             gap = observation.depth_at(p_camera)[0] - p_camera[:, 2]
-            return np.where(np.isfinite(gap), np.maximum(gap, 0.0), 0.0)
+            open_m = np.where(np.isfinite(gap), np.maximum(gap, 0.0), 0.0)
+            if observation.ground is None:
+                return open_m
+            # Nor can anything hide below the floor.
+            return np.maximum(open_m, -observation.ground.height(p_camera))
 
         return retrieve(self.library, lifted, self.config.retrieval, hides=in_the_open_m)
 

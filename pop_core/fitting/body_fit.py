@@ -24,6 +24,7 @@ from pop_core.fitting.depth_consistency import (
     see_body,
 )
 from pop_core.fitting.energy import BodyEnergy, PriorBelief, TermWeights
+from pop_core.fitting.ground_contact import ground_pairs
 from pop_core.fitting.initialisation import initial_parameters
 from pop_core.fitting.levenberg_marquardt import FIRST_DAMPING, cost_of, levenberg_marquardt_step
 from pop_core.fitting.observation import Observation
@@ -162,8 +163,8 @@ class BodyFitter:
                 segment = self._segment(visibility, observation)
             pairs = self._pairs(hypothesis.state, observation, visibility, segment, scale_m)
             if free_space and self.config.free_space:
-                places = HidingPlaces(observation, segment, hypothesis.state.vertices[:, 2])
-                pairs = join_pairs([pairs, free_space_pairs(hypothesis.state, visibility, places)])
+                free = self._free_space(hypothesis.state, observation, visibility, segment)
+                pairs = join_pairs([pairs, free])
             # The surface knows better than keypoints; they stay as a stability penalty (Eq. 2).
             weights = self._weights(1.0, joints=min(1.0, scale_m / 0.10))
             active = self._active(pose=True, betas=free_space or k >= 2)
@@ -198,10 +199,8 @@ class BodyFitter:
             segment = self._segment(visibility, observation)
             pairs = self._pairs(state, observation, visibility, segment, LATE_SCALES_M[-1])
             if self.config.free_space:
-                places = HidingPlaces(observation, segment, state.vertices[:, 2])
-                free = free_space_pairs(state, visibility, places)
-                thinner = self._coarse_share()
-                pairs = join_pairs([pairs, replace(free, weight=free.weight * thinner)])
+                free = self._free_space(state, observation, visibility, segment)
+                pairs = join_pairs([pairs, free])
             weights = self._weights(1.0, joints=LATE_SCALES_M[-1] / 0.10)
             active = self._active(pose=True, betas=True)
             self._step(hypothesis, observation, weights, active, pairs)
@@ -217,7 +216,11 @@ class BodyFitter:
         active: Bool[np.ndarray, 'x'],
         pairs: Pairs | None,
     ) -> None:
-        energy = BodyEnergy(hypothesis.state, observation, hypothesis.belief, weights, pairs)
+        parts = [ground_pairs(hypothesis.state, observation.ground)] if observation.ground else []
+        parts += [pairs] if pairs is not None else []
+        energy = BodyEnergy(
+            hypothesis.state, observation, hypothesis.belief, weights,
+            join_pairs(parts) if parts else None)
         report = levenberg_marquardt_step(
             hypothesis.state, energy.residuals, BodyState.moved, active, hypothesis.damping)
         hypothesis.state, hypothesis.damping = report.state, report.damping
@@ -237,6 +240,19 @@ class BodyFitter:
         # Point to point fades as the kernel shrinks and normals can be trusted.
         tangential = tangential_pairs(toward, 0.3 * scale_m / EARLY_SCALES_M[0])
         return join_pairs([toward, tangential, back])
+
+    def _free_space(
+        self,
+        state: BodyState,
+        observation: Observation,
+        visibility: Visibility,
+        segment: Bool[np.ndarray, 'h w'],
+    ) -> Pairs:
+        places = HidingPlaces(observation, segment, state.vertices[:, 2])
+        free = free_space_pairs(state, visibility, places)
+        # A denser mesh has more vertices in the same space: each counts for less.
+        share = len(self.model.fit_vertices) / len(state.vertices)
+        return replace(free, weight=free.weight * share)
 
     def _segment(
         self, visibility: Visibility, observation: Observation
@@ -262,8 +278,9 @@ class BodyFitter:
     ) -> None:
         """Set each hypothesis's cost: E_depth on common pixels, keypoints and priors beside it."""
         for hypothesis in hypotheses:
+            floor = observation.ground and ground_pairs(hypothesis.state, observation.ground)
             energy = BodyEnergy(
-                hypothesis.state, observation, hypothesis.belief, self._weights(1.0))
+                hypothesis.state, observation, hypothesis.belief, self._weights(1.0), floor)
             rest = cost_of(energy.residuals(hypothesis.state, False))
             visibility = see_body(hypothesis.state, observation)
             depth = depth_energy(visibility, observation, segment)
@@ -279,9 +296,6 @@ class BodyFitter:
         active[TRANSL], active[GLOBAL_ORIENT], active[-1] = True, True, True
         active[betas_slice(self.model.n_betas)] = betas
         return active
-
-    def _coarse_share(self) -> float:
-        return len(self.model.fit_vertices) / len(self.model.v_template)
 
 
 # The robust kernel shrinks as the body settles [m].

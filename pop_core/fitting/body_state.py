@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
+from pop_core.body.joints import JOINT_INDEX
 from pop_core.body.kinematics import (
     PosedSkeleton,
     attached_jacobian,
@@ -21,6 +22,7 @@ from pop_core.rendering.depth_renderer import vertex_normals
 TRANSL = slice(0, 3)
 GLOBAL_ORIENT = slice(3, 6)
 BODY_POSE = slice(6, 75)
+SOLE_M = 0.02  # vertices this close to the lowest of a foot belong to its sole
 
 
 def betas_slice(n_betas: int) -> slice:
@@ -39,10 +41,18 @@ class FitBody:
         self.landmarks: AttachedPoints = shared_points(model)
         self.size = 3 + 72 + model.n_betas + 1
         self.main_bone: Int[np.ndarray, 'n'] = self.skinning.bone_ids[:, 0]
+        self.soles = (self._sole('left'), self._sole('right'))
 
     def state(self, parameters: BodyParameters) -> BodyState:
         """Return the state of a set of parameters."""
         return BodyState(self, parameters)
+
+    def _sole(self, side: str) -> Int[np.ndarray, 'n']:
+        """Return the vertices under one foot."""
+        rest_height = self.skinning.v_template[:, 1]
+        foot = np.isin(
+            self.main_bone, [JOINT_INDEX[f'{side}_ankle'], JOINT_INDEX[f'{side}_foot']])
+        return np.flatnonzero(foot & (rest_height < rest_height[foot].min() + SOLE_M))
 
 
 class BodyState:

@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Float32, Int
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.rgbd import RgbdFrame, flying_pixels
+from pop_core.segmentation.ground import Ground
 
 REACH_M = 1.25  # half size of the window around a person: a tall one with a raised arm fits
 RAY_SIGMA_PX = 12.0  # a detector's guess of a hidden joint is rarely better
@@ -72,6 +73,7 @@ class Observation:
         labels: Body part per pixel as a joint index, -1 where unknown; None without a part map.
         lifted: Lifted joints of the person.
         keypoint_rays: Rays of the keypoints that were not lifted.
+        ground: The floor, or None when none is seen.
     """
 
     window: Window
@@ -82,6 +84,7 @@ class Observation:
     labels: Int[np.ndarray, 'h w'] | None
     lifted: LiftedJoints
     keypoint_rays: KeypointRays
+    ground: Ground | None
 
     def points(self, mask: Bool[np.ndarray, 'h w']) -> Float[np.ndarray, 'n 3']:
         """Return the measured points of a mask [m], camera frame, in row order."""
@@ -113,6 +116,7 @@ def observe(
     frame: RgbdFrame,
     lifted: LiftedJoints,
     others: Bool[np.ndarray, 'h w'],
+    ground: Ground | None = None,
     labels: Int[np.ndarray, 'h w'] | None = None,
 ) -> Observation:
     """Return the observation of one person.
@@ -121,6 +125,7 @@ def observe(
         frame: The undistorted frame.
         lifted: The person's joints; at least one is lifted.
         others: Pixels already explained by nearer people; they stay in the depth as occluders.
+        ground: The floor of the scene, if one is seen.
         labels: Body part per pixel as a joint index, -1 where unknown.
     """
     window = person_window(lifted, frame.camera)
@@ -130,7 +135,7 @@ def observe(
     parts = None if labels is None else window.cut(labels)
     rays = camera.ray_grid()
     rays_of_keypoints = keypoint_rays(lifted, frame.camera)
-    return Observation(window, camera, depth_m, rays, own, parts, lifted, rays_of_keypoints)
+    return Observation(window, camera, depth_m, rays, own, parts, lifted, rays_of_keypoints, ground)
 
 
 def keypoint_rays(lifted: LiftedJoints, camera: Camera) -> KeypointRays:

@@ -1,0 +1,109 @@
+"""The floor of a scene: the horizontal plane that nothing lies below."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Float32
+
+from pop_core.geometry.camera import Camera
+from pop_core.rgbd import RgbdFrame
+
+GRID_PX = 80  # longest side of the thinned image: a floor is large
+TILT_COS = 0.6  # cameras look down or up by at most 53 degrees
+ROLL_SIN = 0.35
+INLIER_M = 0.03
+REFINEMENTS = 3
+MIN_SHARE = 0.02  # of all measured points
+MAX_BELOW = 0.02  # share of points that may lie below a floor: mirrors, noise
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ground:
+    """A floor plane: `normal . p + offset_m` is the height of a point above it [m].
+
+    Args:
+        normal: Unit normal pointing up, camera frame.
+        offset_m: Height of the camera above the floor [m].
+    """
+
+    normal: Float[np.ndarray, '3']
+    offset_m: float
+
+    def height(self, p_camera: Float[np.ndarray, 'n 3']) -> Float[np.ndarray, 'n']:
+        """Return heights above the floor [m]."""
+        return p_camera @ self.normal + self.offset_m
+
+
+def find_ground(frame: RgbdFrame, tries: int = 60) -> Ground | None:
+    """Return the floor, or None when no large upward plane has nothing below it.
+
+    Every candidate plane is one measured point with its own normal; the one with the most points
+    on it and almost none below it is refined by least squares. Tables lose because the floor
+    lies below them.
+
+    Args:
+        frame: An undistorted frame.
+        tries: How many points, evenly over the upward ones, propose a plane.
+    """
+    points, normals = _points_and_normals(frame.depth_m, frame.camera)
+    # Camera y points down, so a floor's normal has negative y; cameras pitch more than they roll.
+    upward = np.flatnonzero((normals[:, 1] < -TILT_COS) & (np.abs(normals[:, 0]) < ROLL_SIN))
+    if len(upward) < MIN_SHARE * len(points) or len(points) < 50:
+        return None
+    proposals = upward[:: max(1, len(upward) // tries)]
+    normal, on_plane = normals[proposals], points[proposals]
+    height = points @ normal.T - np.einsum('pc,pc->p', normal, on_plane)
+    # Depth noise grows with distance, and so does the width of a plane.
+    width = INLIER_M + 0.004 * points[:, 2:] ** 2
+    support = (np.abs(height) < width).mean(axis=0)
+    below = (height < -3 * width).mean(axis=0)
+    support[below > MAX_BELOW] = 0.0
+    best = int(np.argmax(support))
+    if support[best] < MIN_SHARE:
+        return None
+    ground = Ground(normal[best], float(-normal[best] @ on_plane[best]))
+    for _ in range(REFINEMENTS):
+        ground = _refine(ground, points, width[:, 0])
+    return ground
+
+
+def _refine(
+    ground: Ground, points: Float[np.ndarray, 'n 3'], width: Float[np.ndarray, 'n']
+) -> Ground:
+    """Return the least squares plane of the points on a plane, far ones counting less."""
+    weight = (np.abs(ground.height(points)) < width) / width**2
+    centre = weight @ points / weight.sum()
+    spread = np.sqrt(weight)[:, None] * (points - centre)
+    normal = np.linalg.eigh(spread.T @ spread)[1][:, 0]
+    normal = normal * np.sign(normal @ ground.normal)
+    return Ground(normal, float(-normal @ centre))
+
+
+def _points_and_normals(
+    depth_m: Float32[np.ndarray, 'h w'], camera: Camera
+) -> tuple[Float[np.ndarray, 'n 3'], Float[np.ndarray, 'n 3']]:
+    """Return a thinned cloud [m] and its unit normals toward the camera."""
+    stride = max(1, max(depth_m.shape) // GRID_PX)
+    # A median: single pixels are noisy.
+    smooth = cv2.medianBlur(np.nan_to_num(depth_m[::stride, ::stride]), 3)
+    v, u = np.mgrid[0: depth_m.shape[0]: stride, 0: depth_m.shape[1]: stride]
+    z = smooth.astype(np.float64)
+    p = np.stack([(u - camera.cx) / camera.fx * z, (v - camera.cy) / camera.fy * z, z], axis=-1)
+    across, down = p[1:-1, 2:] - p[1:-1, :-2], p[2:, 1:-1] - p[:-2, 1:-1]
+    n = np.cross(down, across)
+    length = np.linalg.norm(n, axis=-1)
+    valid = _whole_patches(z > 0) & (length > 0)
+    normals = n[valid] / length[valid][:, None]
+    points = p[1:-1, 1:-1][valid]
+    toward = np.sign(-np.einsum('nc,nc->n', normals, points))
+    return points, normals * toward[:, None]
+
+
+def _whole_patches(measured: Bool[np.ndarray, 'h w']) -> Bool[np.ndarray, 'h2 w2']:
+    """Return inner pixels whose four neighbours and themselves are measured."""
+    return (
+        measured[1:-1, 1:-1] & measured[1:-1, 2:] & measured[1:-1, :-2]
+        & measured[2:, 1:-1] & measured[:-2, 1:-1])
