@@ -54,7 +54,7 @@ def draw_camera(
 def look_at(
     position_room: Float[np.ndarray, '3'], aim_room: Float[np.ndarray, '3'], roll_rad: float = 0.0
 ) -> Float[np.ndarray, '4 4']:
-    """Return T_camera_room (x right, y down, z forward) of a camera at a point, looking at another.
+    """Return T_camera_room (x right, y down, z forward) of a camera that looks at a point.
 
     Args:
         position_room: Optical centre [m].

@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from pop_core.body.joints import N_SHARED, SHARED_MIRROR
 from pop_core.estimate import JointState
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.detection import Detection
+from pop_core.keypoints.people import detection_of
 
 MIN_KEYPOINTS = 4
 
@@ -67,13 +68,12 @@ def noisy_detection(
     high = np.clip(rng.normal(0.82, 0.08, N_SHARED), 0.3, 0.98)
     low = np.clip(rng.normal(0.35, 0.12, N_SHARED), 0.06, 0.7)
     scores = np.where(found, np.where(guessed, low, high), 0.0)
-    keypoints = np.where(found[:, None], keypoints, np.nan)
-    return Detection(keypoints, scores, _box(keypoints[found], camera))
+    return detection_of(keypoints, scores)
 
 
 def _guesses(
     states: Int[np.ndarray, '15'], rng: np.random.Generator, noise: KeypointNoise
-) -> np.ndarray:
+) -> Bool[np.ndarray, '15']:
     """Return which hidden points the detector puts somewhere all the same."""
     chance = np.select(
         [states == JointState.SELF_OCCLUDED, states == JointState.SCENE_OCCLUDED],
@@ -83,7 +83,7 @@ def _guesses(
 
 def _with_outliers(
     keypoints: Float[np.ndarray, '15 2'], on_person: Float[np.ndarray, 'n 2'],
-    candidates: np.ndarray, rng: np.random.Generator, share: float,
+    candidates: Bool[np.ndarray, '15'], rng: np.random.Generator, share: float,
 ) -> Float[np.ndarray, '15 2']:
     """Return keypoints of which some lie anywhere in the box of what is seen of the person."""
     if len(on_person) == 0:
@@ -93,13 +93,9 @@ def _with_outliers(
     return np.where(wrong[:, None], anywhere, keypoints)
 
 
-def _inside(keypoints: Float[np.ndarray, '15 2'], camera: Camera) -> np.ndarray:
-    return ((keypoints >= 0) & (keypoints <= [camera.width - 1, camera.height - 1])).all(axis=1)
+def _inside(
+    keypoints: Float[np.ndarray, '15 2'], camera: Camera
+) -> Bool[np.ndarray, '15']:
+    last = [camera.width - 1, camera.height - 1]
+    return ((keypoints >= 0) & (keypoints <= last)).all(axis=1)
 
-
-def _box(found_px: Float[np.ndarray, 'n 2'], camera: Camera) -> Float[np.ndarray, '4']:
-    """Return the box of the keypoints, a tenth larger, inside the image."""
-    low, high = found_px.min(axis=0), found_px.max(axis=0)
-    margin = 0.1 * (high - low).max()
-    size = np.array([camera.width - 1, camera.height - 1], dtype=np.float64)
-    return np.concatenate([np.clip(low - margin, 0, size), np.clip(high + margin, 0, size)])

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from pop_core.body.kinematics import joints
 from pop_core.body.model import BodyModel
 from pop_core.geometry.camera import Camera
-from pop_core.geometry.transform import invert_transform, transform_points
+from pop_core.geometry.transform import invert_transform
 from pop_core.synthesis.blocks import Block, block_surface, depth_inside, moved
 from pop_core.synthesis.cameras import CameraRange, draw_camera
 from pop_core.synthesis.occluders import OCCLUDERS
@@ -156,7 +156,7 @@ def _draw_occluders(
     for _ in range(25):
         blocks: tuple[Block, ...] = ()
         for _ in range(rng.integers(config.occluders[0], config.occluders[1] + 1)):
-            thing = _before(actors[rng.integers(len(actors))], eye, rng)
+            thing = _before(actors[int(rng.integers(len(actors)))], eye, rng)
             blocks = blocks if _touch(blocks, thing) else blocks + thing
         if not _free(blocks, actors, eye):
             continue

@@ -56,7 +56,8 @@ def crate(rng: np.random.Generator) -> list[Block]:
     parts = [box([w, h, d], [0, 0, 0], colour)]
     if rng.random() < 0.4:
         top = rng.uniform(0.25, 0.5)
-        parts.append(box([w * 0.7, top, d * 0.8], [rng.normal(0, 0.08), h, 0], varied(colour, rng)))
+        base = [rng.normal(0, 0.08), h, 0]
+        parts.append(box([w * 0.7, top, d * 0.8], base, varied(colour, rng)))
     return parts
 
 
@@ -104,7 +105,7 @@ def shelf(rng: np.random.Generator) -> list[Block]:
         parts.append(box([w, 0.03, d], [0, level, 0], colour, Texture.WOOD))
         n = int(rng.integers(0, 4))
         for x in rng.uniform(-0.4, 0.4, n) * w:
-            parts.append(box([0.15, rng.uniform(0.12, 0.28), 0.2], [x, level + 0.03, 0],
+            parts.append(box([0.15, rng.uniform(0.12, 0.22), 0.2], [x, level + 0.03, 0],
                              any_colour(rng)))
     return parts
 

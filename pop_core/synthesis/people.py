@@ -46,7 +46,7 @@ class Actor:
 def draw_actor(
     model: BodyModel, kind: str, rng: np.random.Generator, child: bool = False
 ) -> Actor:
-    """Return a person above the origin, heading along +z, on the floor or on a seat of their own."""
+    """Return a person above the origin, heading along +z, on the floor or on their own seat."""
     betas = np.clip(rng.normal(size=model.n_betas), -2.0, 2.0)
     scale = float(rng.uniform(0.62, 0.85)) if child else 1.0
     outfit = draw_outfit(model, rng)

@@ -12,7 +12,6 @@ from pop_core.body.kinematics import attached_positions, joints
 from pop_core.body.model import BodyModel, BodyParameters, shared_points
 from pop_core.errors import PopError
 from pop_core.estimate import JointState
-from pop_core.geometry.camera import Camera
 from pop_core.geometry.transform import invert_transform, transform_points
 from pop_core.keypoints.detection import Detection
 from pop_core.rendering.depth_renderer import RenderedDepth, render_depth
@@ -20,7 +19,7 @@ from pop_core.rgbd import RgbdFrame
 from pop_core.synthesis.blocks import Surface, Texture, block_surface
 from pop_core.synthesis.keypoints import KeypointNoise, noisy_detection
 from pop_core.synthesis.layouts import Layout, SceneConfig, draw_layout
-from pop_core.synthesis.people import Actor, moved_parameters
+from pop_core.synthesis.people import moved_parameters
 from pop_core.synthesis.rooms import room_surfaces
 from pop_core.synthesis.sensor_noise import SENSORS
 from pop_core.synthesis.shading import Stage, joined, shade

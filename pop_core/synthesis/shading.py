@@ -100,7 +100,8 @@ def _shadow(
     T_light_camera[:3, 3] = R_light_room @ (T_room_camera[:3, 3] - light_room)
     half = (LIGHT_SIZE_PX - 1) / 2
     lamp = Camera(LIGHT_SIZE_PX, LIGHT_SIZE_PX, half / 1.6, half / 1.6, half, half)
-    map_m = render_depth(transform_points(T_light_camera, stage.vertices), stage.faces, lamp).depth_m
+    lamp_view = transform_points(T_light_camera, stage.vertices)
+    map_m = render_depth(lamp_view, stage.faces, lamp).depth_m
     seen = transform_points(T_light_camera, points)
     z = np.maximum(seen[..., 2], 1e-3)
     uv = np.rint(seen[..., :2] / z[..., None] * lamp.fx + half)

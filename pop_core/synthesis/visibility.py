@@ -47,15 +47,15 @@ def shared_states(
     own_depth_m: Float[np.ndarray, 'h w'], others_depth_m: Float[np.ndarray, 'h w'],
     camera: Camera,
 ) -> Int[np.ndarray, '15']:
-    """Return a JointState per shared point; the head's is that of the nose, a point of the skin."""
+    """Return a JointState per shared point; the head's is that of the nose, a skin point."""
     out = states[SHARED].copy()
     row = int(np.flatnonzero(SHARED == JOINT_INDEX['head'])[0])
     inside, u, v = _pixels(nose[None], camera)
     if not inside[0]:
         out[row] = JointState.OUT_OF_IMAGE
-    elif others_depth_m[v[0], u[0]] < nose[2]:
+    elif nose[2] > others_depth_m[v[0], u[0]]:
         out[row] = JointState.SCENE_OCCLUDED
-    elif own_depth_m[v[0], u[0]] < nose[2] - NOSE_M:
+    elif nose[2] - own_depth_m[v[0], u[0]] > NOSE_M:
         out[row] = JointState.SELF_OCCLUDED
     else:
         out[row] = JointState.VISIBLE
