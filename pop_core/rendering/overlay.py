@@ -1,0 +1,107 @@
+"""Fitted people over the colour image: shaded mesh, skeleton, and the contour of the mask."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+
+from pop_core.body.joints import PARENTS
+from pop_core.estimate import BodyEstimate, JointState
+from pop_core.geometry.camera import Camera
+from pop_core.rendering.palette import INK, PAPER, person_color
+from pop_core.rendering.shading import shade
+
+OPACITY = 0.72
+SHIFT = 4  # fractional bits of cv2's coordinates: joints are drawn where they are
+AROUND_JOINT_M = 0.035
+
+
+def draw_people(
+    rgb: UInt8[np.ndarray, 'h w 3'],
+    bodies: Sequence[BodyEstimate],
+    f: Int[np.ndarray, 'm 3'],
+    camera: Camera,
+) -> UInt8[np.ndarray, 'h w 3']:
+    """Return the colour image with meshes, farthest first, then all skeletons."""
+    picture = rgb.copy()
+    order = sorted(range(len(bodies)), key=lambda i: -float(bodies[i].joints[0, 2]))
+    for index in order:
+        draw_mesh(picture, bodies[index].vertices, f, camera, person_color(index))
+    for index in order:
+        draw_mask_contour(picture, bodies[index].mask, person_color(index))
+        draw_skeleton(picture, bodies[index].joints, bodies[index].joint_state, camera)
+    return picture
+
+
+def draw_mesh(
+    picture: UInt8[np.ndarray, 'h w 3'],
+    vertices_camera: Float[np.ndarray, 'n 3'],
+    f: Int[np.ndarray, 'm 3'],
+    camera: Camera,
+    color: tuple[int, int, int],
+) -> None:
+    """Blend a shaded mesh into the picture."""
+    rendered, shaded = shade(vertices_camera, f, camera, color)
+    seen = rendered.covered
+    picture[seen] = np.rint(OPACITY * shaded[seen] + (1 - OPACITY) * picture[seen])
+
+
+def draw_mask_contour(
+    picture: UInt8[np.ndarray, 'h w 3'],
+    mask: Bool[np.ndarray, 'h w'],
+    color: tuple[int, int, int],
+) -> None:
+    """Draw the outline of a mask into the picture, dark under bright so that it shows anywhere."""
+    contours, _ = cv2.findContours(
+        mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    width = _line_width(picture)
+    cv2.drawContours(picture, contours, -1, INK, width + 2, cv2.LINE_AA)
+    cv2.drawContours(picture, contours, -1, color, width, cv2.LINE_AA)
+
+
+def draw_skeleton(
+    picture: UInt8[np.ndarray, 'h w 3'],
+    joints_camera: Float[np.ndarray, '24 3'],
+    joint_state: Int[np.ndarray, '24'],
+    camera: Camera,
+) -> None:
+    """Draw bones and joints into the picture; joints that are not visible are hollow."""
+    uv = camera.project(joints_camera)
+    width = _line_width(picture)
+    for child, parent in enumerate(PARENTS):
+        if parent >= 0 and np.isfinite(uv[[child, parent]]).all():
+            start, end = _fixed(uv[parent]), _fixed(uv[child])
+            cv2.line(picture, start, end, INK, width + 2, cv2.LINE_AA, SHIFT)
+            cv2.line(picture, start, end, PAPER, width, cv2.LINE_AA, SHIFT)
+    for point, state, z in zip(uv, joint_state, joints_camera[:, 2], strict=True):
+        if np.isfinite(point).all():
+            radius = float(np.clip(AROUND_JOINT_M * camera.fx / z, 2.5, 9.0))
+            filled = state == JointState.VISIBLE
+            _draw_joint(picture, point, radius, width, filled=filled)
+
+
+def _draw_joint(
+    picture: UInt8[np.ndarray, 'h w 3'],
+    uv: Float[np.ndarray, '2'],
+    radius_px: float,
+    width: int,
+    *,
+    filled: bool,
+) -> None:
+    center, radius = _fixed(uv), round(radius_px * (1 << SHIFT))
+    inside = PAPER if filled else INK
+    cv2.circle(picture, center, radius, inside, cv2.FILLED, cv2.LINE_AA, SHIFT)
+    cv2.circle(picture, center, radius, INK if filled else PAPER, width, cv2.LINE_AA, SHIFT)
+
+
+def _fixed(uv: Float[np.ndarray, '2']) -> tuple[int, int]:
+    """Return a pixel in cv2's fixed point; far outside points are clipped, not wrapped."""
+    u, v = np.clip(np.rint(uv * (1 << SHIFT)), -1e6, 1e6).astype(int)
+    return int(u), int(v)
+
+
+def _line_width(picture: UInt8[np.ndarray, 'h w 3']) -> int:
+    return max(1, round(picture.shape[1] / 640))

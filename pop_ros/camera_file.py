@@ -1,0 +1,69 @@
+"""Read `camera.json`: `width height fx fy cx cy`, optional `distortion_model` and `d`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pop_core.errors import CameraError, FrameError
+from pop_core.geometry.camera import Camera
+from pop_ros.json_file import load_json_object
+
+INTRINSICS = ('fx', 'fy', 'cx', 'cy')
+
+
+def load_camera(path: Path) -> Camera:
+    """Return the camera of a `camera.json`.
+
+    Raises:
+        FrameError: If the file is no JSON object, or a value is missing, of another type or
+            not a camera's.
+    """
+    content = load_json_object(path)
+    width, height = (_integer(content, name, path) for name in ('width', 'height'))
+    fx, fy, cx, cy = (_number(content.get(name), name, path) for name in INTRINSICS)
+    model = content.get('distortion_model') or ''
+    if not isinstance(model, str):
+        raise FrameError(f'{path}: expected distortion_model as text, found {model!r}')
+    coefficients = content.get('d') or []
+    if not isinstance(coefficients, list):
+        raise FrameError(f'{path}: expected d as a list of numbers, found {coefficients!r}')
+    d = np.array([_number(value, 'd', path) for value in coefficients], dtype=np.float64)
+    try:
+        return Camera(width, height, fx, fy, cx, cy, model if d.size else '', d)
+    except CameraError as error:
+        raise FrameError(f'{path}: {error}') from None
+
+
+def camera_json(camera: Camera) -> dict[str, Any]:
+    """Return a camera as `load_camera` reads it."""
+    content: dict[str, Any] = {'width': camera.width, 'height': camera.height}
+    content.update({name: float(getattr(camera, name)) for name in INTRINSICS})
+    if camera.d.size:
+        content.update(distortion_model=camera.distortion_model, d=camera.d.tolist())
+    return content
+
+
+def _integer(content: dict[str, Any], name: str, path: Path) -> int:
+    value = _number(content.get(name), name, path)
+    if value != int(value):
+        raise FrameError(f'{path}: expected {name} as a whole number, found {value}')
+    return int(value)
+
+
+def _number(value: object, name: str, path: Path) -> float:
+    plain = isinstance(value, int | float) and not isinstance(value, bool)
+    if not plain or not _is_finite(value):  # type: ignore[arg-type]
+        found = 'nothing' if value is None else repr(value)[:40]
+        raise FrameError(f'{path}: expected {name} as a finite number, found {found}')
+    return float(value)  # type: ignore[arg-type]
+
+
+def _is_finite(value: float) -> bool:
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer beyond every float
+        return False

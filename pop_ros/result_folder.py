@@ -1,0 +1,100 @@
+"""Write what the pipeline found in one frame: `person_K.npz`, `result.json` and `overlay.png`.
+
+Positions are in the camera frame [m], rotations are rotation vectors [rad], shapes are SMPL's.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from pop_core.body.model import BodyModel, rest_parameters
+from pop_core.body.skinning import vertices
+from pop_core.estimate import BodyEstimate, EstimateStatus, FrameResult, JointState
+from pop_core.rendering.pictures import result_picture
+from pop_core.rgbd import RgbdFrame
+
+
+def write_results(folder: Path, frame: RgbdFrame, result: FrameResult, model: BodyModel) -> None:
+    """Write all files of one frame; `result.json` comes last and so marks a whole folder.
+
+    Raises:
+        OSError: If the folder cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    for stale in [folder / 'result.json', *folder.glob('person_*.npz')]:
+        stale.unlink(missing_ok=True)
+    for index, body in enumerate(result.bodies):
+        np.savez_compressed(folder / f'person_{index}.npz', **person_arrays(body, model))
+    write_png(folder / 'overlay.png', result_picture(frame, result, model.f))
+    content = json.dumps(result_json(result), indent=2)
+    (folder / 'result.json').write_text(content + '\n', encoding='utf-8')
+
+
+def person_arrays(body: BodyEstimate, model: BodyModel) -> dict[str, Any]:
+    """Return the arrays of a person's file by name."""
+    parameters = body.parameters
+    tpose = rest_parameters(len(parameters.betas)).replaced(
+        betas=parameters.betas, scale=parameters.scale)
+    return {
+        'joints': body.joints,
+        'vertices': body.vertices.astype(np.float32),
+        'global_orient': parameters.global_orient,
+        'body_pose': parameters.body_pose,
+        'transl': parameters.transl,
+        'betas': parameters.betas,
+        'scale': np.float64(parameters.scale),
+        'joint_state': body.joint_state.astype(np.int64),
+        'joint_covariance': body.joint_covariance,
+        'mask': body.mask,
+        'tpose_vertices': vertices(model, tpose).astype(np.float32),
+        'faces': model.f.astype(np.int32),
+        'score': np.float64(body.score),
+    }
+
+
+def result_json(result: FrameResult) -> dict[str, Any]:
+    """Return what is worth reading of a result without loading arrays."""
+    return {
+        'status': status_sentence(result),
+        'people': [_person_json(index, body) for index, body in enumerate(result.bodies)],
+        'detections': [status.value for status in result.statuses],
+        'times_ms': {name: round(float(ms), 3) for name, ms in result.times_ms.items()},
+    }
+
+
+def status_sentence(result: FrameResult) -> str:
+    """Return what became of a frame, and of every detection that was not fitted."""
+    n = len(result.bodies)
+    fitted = 'nobody found' if n == 0 else f'{n} {"person" if n == 1 else "people"} fitted'
+    dropped = Counter(s.value for s in result.statuses if s is not EstimateStatus.OK)
+    return '; '.join([fitted, *(f'{count} not fitted: {why}' for why, count in dropped.items())])
+
+
+def write_png(path: Path, rgb: np.ndarray) -> None:
+    """Write an RGB picture.
+
+    Raises:
+        OSError: If the file cannot be written.
+    """
+    done, content = cv2.imencode('.png', cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))
+    if not done:
+        raise OSError(f'{path}: the picture could not be encoded')
+    path.write_bytes(content.tobytes())
+
+
+def _person_json(index: int, body: BodyEstimate) -> dict[str, Any]:
+    states = Counter(JointState(int(state)).name.lower() for state in body.joint_state)
+    return {
+        'file': f'person_{index}.npz',
+        'score': round(float(body.score), 4),
+        'pelvis_m': np.round(body.joints[0], 4).tolist(),
+        'joints_by_state': dict(states),
+        'pixels': int(body.mask.sum()),
+        'energies': {name: float(value) for name, value in body.energies.items()},
+    }
