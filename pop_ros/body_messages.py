@@ -36,6 +36,11 @@ class BodyMessages:
         self._shown: set[int] = set()
         self._templates: dict[tuple[int, str], MarkerTemplate] = {}
 
+    def configure(self, mesh: MeshConfig) -> None:
+        """Take over changed settings; ids stay."""
+        self._mesh = mesh
+        self._templates.clear()
+
     def build(
         self, result: FrameResult, frame: RgbdFrame, frame_id: str,
         wanted: Collection[str] = tuple(OUTPUT_TYPES),

@@ -66,8 +66,8 @@ class InputTopic:
         self._profile = profile
         self._subscription = self._node.create_subscription(
             self._kind, self.topic, self._receive, profile)
-        self._node.get_logger().info(
-            f'{self.role}: subscribed {self.topic} ({describe_qos(profile)})')
+        log = self._node.get_logger()  # type: ignore[no-untyped-call]
+        log.info(f'{self.role}: subscribed {self.topic} ({describe_qos(profile)})')
 
     def leave(self) -> None:
         """Unsubscribe."""

@@ -1,0 +1,159 @@
+"""Read bags of ROS 1 (.bag) and ROS 2 (.db3, .mcap, folders) alike, damaged ones in part.
+
+Whatever the bag's version, messages come out as ROS 2 CDR, so that they can be published as they
+are and read with one set of types.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+from pop_core.errors import PopError
+from pop_ros.bag_salvage import SalvagedMessage, is_ros1_bag, salvage
+
+SUFFIXES = ('.bag', '.db3', '.mcap')
+STORE = get_typestore(Stores.ROS2_JAZZY)
+
+
+class BagError(PopError):
+    """A bag that does not exist, is no bag, or lacks the topics that are needed."""
+
+
+@dataclass(frozen=True, slots=True)
+class BagTopic:
+    """One topic of a bag.
+
+    Args:
+        name: Topic.
+        kind: Type in the form 'sensor_msgs/msg/Image'.
+        count: Messages.
+    """
+
+    name: str
+    kind: str
+    count: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BagMessage:
+    """One message of a bag.
+
+    Args:
+        topic: Topic.
+        kind: Type in the form 'sensor_msgs/msg/Image'.
+        time_ns: Time of recording [ns].
+        data: The message as little-endian ROS 2 CDR.
+    """
+
+    topic: str
+    kind: str
+    time_ns: int
+    data: bytes
+
+    def read(self) -> Any:
+        """Return the message as an object with the fields of ROS 2."""
+        return STORE.deserialize_cdr(self.data, self.kind)
+
+
+class BagReader:
+    """An open bag; `damage` says what was wrong with it once it has been read."""
+
+    def __init__(self, path: Path) -> None:
+        """Name a bag: a file, or the folder of a rosbag2.
+
+        Raises:
+            BagError: If there is none.
+        """
+        self.path = path
+        self.files = _files(path)
+        self.damage = ''
+        self.topics: list[BagTopic] = []
+        self._reader: AnyReader | None = None
+
+    def __enter__(self) -> BagReader:
+        """Open the bag.
+
+        Raises:
+            BagError: If nothing in it can be read.
+        """
+        try:
+            reader = AnyReader(self.files, default_typestore=STORE)
+            reader.open()
+        except Exception as error:  # noqa: BLE001 - rosbags passes on what its storages raise
+            self.damage = f'{error}'.rstrip('.') or type(error).__name__
+            self.topics = self._salvaged_topics()
+        else:
+            self._reader = reader
+            counts = Counter[tuple[str, str]]()
+            for c in reader.connections:
+                counts[c.topic, c.msgtype] += c.msgcount
+            self.topics = [BagTopic(*key, count) for key, count in sorted(counts.items())]
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close the bag."""
+        if self._reader is not None:
+            self._reader.close()
+            self._reader = None
+
+    def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
+        """Yield the messages of some topics in order of time, up to the damage if there is any."""
+        if self._reader is None:
+            yield from self._salvaged(topics)
+            return
+        connections = [c for c in self._reader.connections if c.topic in topics]
+        try:
+            for connection, time_ns, raw in self._reader.messages(connections):
+                data = _as_cdr(raw, connection.msgtype, is_ros2=self._reader.is2)
+                yield BagMessage(connection.topic, connection.msgtype, time_ns, data)
+        except Exception as error:  # noqa: BLE001 - rosbags passes on what its storages raise
+            self.damage = f'{error}'.rstrip('.') or type(error).__name__
+
+    def _salvaged_topics(self) -> list[BagTopic]:
+        counts: Counter[tuple[str, str]] = Counter()
+        for path in self.files:
+            counts.update((m.topic, m.kind) for m in _salvage(path))
+        if not counts:
+            raise BagError(
+                f'{self.path}: expected a bag ({", ".join(SUFFIXES)} or a rosbag2 folder), found '
+                f'no message that can be read ({self.damage})')
+        return [BagTopic(*key, count) for key, count in sorted(counts.items())]
+
+    def _salvaged(self, topics: Collection[str]) -> Iterator[BagMessage]:
+        for path in self.files:
+            for m in _salvage(path):
+                if m.topic in topics:
+                    data = _as_cdr(m.data, m.kind, is_ros2=not is_ros1_bag(path))
+                    yield BagMessage(m.topic, m.kind, m.time_ns, data)
+
+
+def _salvage(path: Path) -> Iterator[SalvagedMessage]:
+    # SQLite cannot be walked without its index; rosbags reads as much of it as there is.
+    return salvage(path) if is_ros1_bag(path) or path.suffix == '.mcap' else iter(())
+
+
+def _as_cdr(raw: bytes | memoryview, kind: str, *, is_ros2: bool) -> bytes:
+    return bytes(raw) if is_ros2 else bytes(STORE.ros1_to_cdr(raw, kind))
+
+
+def _files(path: Path) -> list[Path]:
+    if not path.exists():
+        raise BagError(f'{path}: expected a bag, found nothing there')
+    if path.is_file() or (path / 'metadata.yaml').is_file():
+        return [path]
+    found = sorted(p for p in path.iterdir() if p.suffix in SUFFIXES)
+    if not found:
+        raise BagError(
+            f'{path}: expected a rosbag2 folder, found no {" or ".join(SUFFIXES)} in it')
+    return found

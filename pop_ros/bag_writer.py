@@ -1,0 +1,93 @@
+"""Write results into a new rosbag2 and, beside it, into a ROS 1 bag."""
+
+from __future__ import annotations
+
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Ros2Writer
+from rosbags.typesys import Stores, get_typestore
+
+from pop_ros.bag_reader import STORE, BagError
+
+ROS1_STORE = get_typestore(Stores.ROS1_NOETIC)
+# Types whose layout ROS 2 has extended; they are rewritten field by field.
+EXTENDED_IN_ROS2 = {'visualization_msgs/msg/Marker'}
+
+
+class BagWriter:
+    """A new rosbag2 folder (MCAP), and a ROS 1 bag where asked for."""
+
+    def __init__(self, folder: Path, ros1_file: Path | None = None) -> None:
+        """Prepare the bags.
+
+        Raises:
+            BagError: If one of them exists: recordings are never overwritten.
+        """
+        for path in filter(None, (folder, ros1_file)):
+            if path.exists():
+                raise BagError(f'{path}: expected a new bag to write, found one there already')
+        self.counts: dict[str, int] = {}
+        # Version 9 is that of Jazzy.
+        self._ros2 = Ros2Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
+        self._ros1 = Ros1Writer(ros1_file) if ros1_file is not None else None
+        self._connections: dict[str, tuple[Any, Any]] = {}
+
+    def __enter__(self) -> BagWriter:
+        """Create the bags."""
+        self._ros2.open()
+        if self._ros1 is not None:
+            self._ros1.open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Finish the bags."""
+        self._ros2.close()
+        if self._ros1 is not None:
+            self._ros1.close()
+
+    def add_topic(self, topic: str, kind: str) -> None:
+        """Announce a topic, so that it is in the bag even when nothing is written to it."""
+        if topic in self._connections:
+            return
+        ros1 = None
+        if self._ros1 is not None:
+            ros1 = self._ros1.add_connection(topic, kind, typestore=ROS1_STORE)
+        ros2 = self._ros2.add_connection(topic, kind, typestore=STORE)
+        self._connections[topic] = (ros2, ros1)
+
+    def write(self, topic: str, kind: str, time_ns: int, data: bytes) -> None:
+        """Write a message, given as ROS 2 CDR, at a time [ns]."""
+        self.add_topic(topic, kind)
+        ros2, ros1 = self._connections[topic]
+        self._ros2.write(ros2, time_ns, data)
+        if self._ros1 is not None:
+            self._ros1.write(ros1, time_ns, cdr_to_ros1(data, kind))
+        self.counts[topic] = self.counts.get(topic, 0) + 1
+
+
+def cdr_to_ros1(data: bytes, kind: str) -> bytes:
+    """Return a message of ROS 2 as ROS 1 serialises it; fields ROS 1 does not have are dropped."""
+    if kind not in EXTENDED_IN_ROS2:
+        return bytes(ROS1_STORE.cdr_to_ros1(data, kind))
+    message = _as_ros1(STORE.deserialize_cdr(data, kind))
+    return bytes(ROS1_STORE.serialize_ros1(message, kind))
+
+
+def _as_ros1(value: Any) -> Any:
+    """Return a rosbags message as the ROS 1 type of the same name."""
+    if isinstance(value, list):
+        return [_as_ros1(item) for item in value]
+    if not is_dataclass(value):
+        return value
+    kind: Any = ROS1_STORE.types[value.__msgtype__]  # type: ignore[union-attr]
+    names = [field.name for field in fields(kind) if field.name != '__msgtype__']
+    # Only the sequence number of headers is missing in ROS 2; in bags nobody needs it.
+    return kind(**{name: _as_ros1(getattr(value, name, 0)) for name in names})

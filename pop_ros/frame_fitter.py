@@ -1,0 +1,74 @@
+"""From the messages of one frame to the messages of its bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import Any
+
+from pop_core.config import PipelineConfig
+from pop_core.estimate import FrameResult
+from pop_core.pipeline import BodyPipeline
+from pop_ros.body_messages import OUTPUT_TYPES, BodyMessages, Output
+from pop_ros.from_messages import ImageLike, frame_from_messages
+from pop_ros.node_arguments import SourceArguments
+from pop_ros.node_config import MeshConfig
+from pop_ros.sources import make_detector, make_pipeline
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedFrame:
+    """What became of one frame.
+
+    Args:
+        result: The pipeline's result.
+        outputs: Messages by topic.
+    """
+
+    result: FrameResult
+    outputs: list[Output]
+
+
+class FrameFitter:
+    """A pipeline with ROS messages on both sides."""
+
+    def __init__(
+        self,
+        arguments: SourceArguments,
+        pipeline_config: PipelineConfig,
+        mesh: MeshConfig,
+        progress: Callable[[float, str], None] | None = None,
+    ) -> None:
+        """Load the keypoint source, body model and pose library.
+
+        `progress` is told a share 0..1 and a sentence while a first library is generated.
+
+        Raises:
+            PopError: If one of them cannot be loaded.
+        """
+        detector = make_detector(
+            arguments.keypoints, arguments.keypoints_dir, arguments.decoder)
+        self._pipeline = make_pipeline(detector, pipeline_config, progress=progress)
+        self._messages = BodyMessages(self._pipeline.model, mesh)
+
+    def configure(self, pipeline_config: PipelineConfig, mesh: MeshConfig) -> None:
+        """Take over changed settings; model, library and keypoint source stay loaded."""
+        old = self._pipeline
+        self._pipeline = BodyPipeline(
+            old.model, old.library, old.detector, pipeline_config, old.fitter.prior)
+        self._messages.configure(mesh)
+
+    def fit(
+        self, color: ImageLike, depth: ImageLike, info: Any,
+        wanted: Collection[str] = tuple(OUTPUT_TYPES),
+    ) -> FittedFrame:
+        """Return result and messages of a pair of images and their CameraInfo.
+
+        Raises:
+            BadMessageError: If the messages make no frame.
+            PopError: If the keypoint source cannot read what it needs for this frame.
+        """
+        frame = frame_from_messages(color, depth, info)
+        result = self._pipeline.process(frame)
+        outputs = self._messages.build(result, frame, color.header.frame_id, wanted)
+        return FittedFrame(result, outputs)
