@@ -1,0 +1,128 @@
+"""Numba kernels of lifting: depth layers of a patch, and joint depths on the skeleton tree."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+MAX_LAYERS = 4
+
+
+@njit(cache=True, nogil=True)
+def patch_layers(depth, own, u0, v0, radius, gap_ratio, layers):
+    """Fill layers (4, 4) with (depth, share, spread, own share) of surfaces near a pixel.
+
+    Depths are sorted and cut where neighbours differ by more than gap_ratio times their depth.
+    Pixels count by a Gaussian of the distance to (u0, v0). Returns the number of layers kept,
+    those of the largest shares.
+    """
+    h, w = depth.shape
+    left, right = max(0, int(np.ceil(u0 - radius))), min(w - 1, int(np.floor(u0 + radius)))
+    top, bottom = max(0, int(np.ceil(v0 - radius))), min(h - 1, int(np.floor(v0 + radius)))
+    size = max(0, right - left + 1) * max(0, bottom - top + 1)
+    z = np.empty(size)
+    weight = np.empty(size)
+    mine = np.empty(size)
+    n = 0
+    total = 0.0
+    for y in range(top, bottom + 1):
+        for x in range(left, right + 1):
+            d2 = ((x - u0) ** 2 + (y - v0) ** 2) / (radius * radius)
+            if d2 > 1.0:
+                continue
+            g = np.exp(-2.0 * d2)
+            total += g
+            value = depth[y, x]
+            if np.isnan(value):
+                continue
+            z[n], weight[n] = value, g
+            mine[n] = g if own[y, x] else 0.0
+            n += 1
+    layers[:] = 0.0
+    if n == 0:
+        return 0
+    order = np.argsort(z[:n])
+    kept = 0
+    start = 0
+    for i in range(1, n + 1):
+        if i < n and z[order[i]] - z[order[i - 1]] <= gap_ratio * z[order[i]]:
+            continue
+        kept = _keep_layer(z, weight, mine, order[start:i], total, layers, kept)
+        start = i
+    return kept
+
+
+@njit(cache=True, nogil=True)
+def _keep_layer(z, weight, mine, members, total, layers, kept):
+    """Add one layer, in place of the smallest when there is no room; return how many there are."""
+    share = 0.0
+    own = 0.0
+    for i in members:
+        share += weight[i]
+        own += mine[i]
+    place = kept
+    if kept == MAX_LAYERS:
+        place = np.argmin(layers[:, 1])
+        if layers[place, 1] >= share / total:
+            return kept
+    m = len(members)
+    layers[place, 0] = z[members[m // 2]]
+    layers[place, 1] = share / total
+    layers[place, 2] = 0.5 * (z[members[(3 * m) // 4]] - z[members[m // 4]]) * 1.4826
+    layers[place, 3] = own / share
+    return min(kept + 1, MAX_LAYERS)
+
+
+@njit(cache=True, nogil=True)
+def tree_depths(unary, bins, rays, parents, order, longest, tolerance, worst, out):
+    """Fill out (n) with the bin of each joint that minimises unary and bone costs on the tree.
+
+    A bone costs 0.5 ((length - longest) / tolerance)^2 when too long, `worst` at most, plus a
+    small preference for equal depths. Exact by dynamic programming, leaves first.
+
+    Args:
+        unary: Cost of each joint at each bin (n, m).
+        bins: Depth of each bin [m], evenly spaced.
+        rays: (x/z, y/z) of each joint (n, 2); NaN where the pixel is unknown.
+        parents: Parent of each joint, -1 for the root.
+        order: Joints, parents before children.
+        longest: Longest bone from each joint to its parent [m].
+        tolerance: Softness of that limit [m].
+        worst: Most that a broken bone costs.
+        out: Chosen bins, filled.
+    """
+    n, m = unary.shape
+    step = bins[1] - bins[0]
+    cost = unary.copy()
+    best = np.empty((n, m), dtype=np.int64)
+    for k in range(n - 1, 0, -1):
+        j = order[k]
+        parent = parents[j]
+        lowest = np.argmin(cost[j])
+        fallback = cost[j, lowest] + worst
+        band = int(np.ceil((longest[j] + 4.0 * tolerance) / step))
+        seen = not (np.isnan(rays[j, 0]) or np.isnan(rays[parent, 0]))
+        for b in range(m):
+            smallest = fallback
+            chosen = lowest
+            for a in range(max(0, b - band), min(m, b + band + 1)):
+                if cost[j, a] >= smallest:
+                    continue
+                dz = bins[a] - bins[b]
+                square = dz * dz
+                if seen:
+                    dx = rays[j, 0] * bins[a] - rays[parent, 0] * bins[b]
+                    dy = rays[j, 1] * bins[a] - rays[parent, 1] * bins[b]
+                    square += dx * dx + dy * dy
+                excess = max(0.0, np.sqrt(square) - longest[j]) / tolerance
+                bone = min(worst, 0.5 * excess * excess) + 0.2 * (dz / longest[j]) ** 2
+                if cost[j, a] + bone < smallest:
+                    smallest = cost[j, a] + bone
+                    chosen = a
+            best[j, b] = chosen
+            cost[parent, b] += smallest
+    root = order[0]
+    out[root] = np.argmin(cost[root])
+    for k in range(1, n):
+        j = order[k]
+        out[j] = best[j, out[parents[j]]]

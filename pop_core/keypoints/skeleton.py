@@ -1,0 +1,36 @@
+"""The 15 shared joints as a tree of bones with lengths [m] of the mean default body."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pop_core.body.joints import SHARED_INDEX
+
+ROOT = 'pelvis'
+# (joint, parent, mean length [m]); the head's bone ends at the nose. Parents before children.
+BONES = (
+    ('neck', ROOT, 0.541),
+    ('head', 'neck', 0.182),
+    ('left_hip', ROOT, 0.113),
+    ('right_hip', ROOT, 0.113),
+    ('left_shoulder', 'neck', 0.200),
+    ('right_shoulder', 'neck', 0.200),
+    ('left_knee', 'left_hip', 0.379),
+    ('right_knee', 'right_hip', 0.379),
+    ('left_elbow', 'left_shoulder', 0.257),
+    ('right_elbow', 'right_shoulder', 0.257),
+    ('left_ankle', 'left_knee', 0.433),
+    ('right_ankle', 'right_knee', 0.433),
+    ('left_wrist', 'left_elbow', 0.230),
+    ('right_wrist', 'right_elbow', 0.230),
+)
+ORDER = np.array([SHARED_INDEX[ROOT], *(SHARED_INDEX[bone[0]] for bone in BONES)])
+TREE_PARENT = np.full(len(ORDER), -1)
+BONE_M = np.full(len(ORDER), np.nan)  # to the parent; NaN for the root
+for _joint, _parent, _length in BONES:
+    TREE_PARENT[SHARED_INDEX[_joint]] = SHARED_INDEX[_parent]
+    BONE_M[SHARED_INDEX[_joint]] = _length
+TORSO = np.array([
+    SHARED_INDEX[name] for name in
+    ('pelvis', 'neck', 'left_hip', 'right_hip', 'left_shoulder', 'right_shoulder')
+])
