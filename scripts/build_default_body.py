@@ -16,7 +16,7 @@ from default_body.source import load_source, sample_people
 from default_body.tpose import to_tpose
 
 from pop_core.body.decimation import decimate
-from pop_core.body.joints import MIRROR, PARENTS
+from pop_core.body.joints import JOINT_INDEX, MIRROR, PARENTS
 
 CHILD_SHARE = 0.06
 N_ADULTS, N_CHILDREN = 1500, 500
@@ -36,49 +36,63 @@ def main() -> None:
     parser.add_argument('--out', type=Path, default=Path('pop_core/data/default_body.npz'))
     out = parser.parse_args().out
     source = load_source()
-    adults = sample_people(source, (18.0, 80.0), N_ADULTS, seed=0)
-    children = sample_people(source, (3.0, 17.0), N_CHILDREN, seed=1)
-
-    coarse, joints = to_tpose(adults, adults.half_vertices, source.weights)
-    half = remesh.remesh_half(coarse.mean(0), source.faces, joints[:, 20, 0].mean())
+    people = [
+        to_tpose(sample_people(source, (18.0, 80.0), N_ADULTS, seed=0), source.weights),
+        to_tpose(sample_people(source, (3.0, 17.0), N_CHILDREN, seed=1), source.weights),
+    ]
+    skeletons = [joints for _, joints in people]
+    toes = source.weights[:, JOINT_INDEX['left_foot']] > 0.5
+    half = remesh.remesh_half(
+        people[0][0].mean(0), source.faces, toes, skeletons[0].mean(0)
+    )
     origin, side, mirror_of, faces = remesh.mirror(half)
-    half_weights = strongest(half.rows @ source.weights, 4)
-
-    bodies, skeletons = [], []
-    for people in (adults, children):
-        vertices = np.stack([half.rows @ person for person in people.half_vertices])
-        vertices, joints = to_tpose(people, vertices, half_weights)
-        whole = vertices[:, origin]
-        whole[..., 0] *= side
-        bodies.append(whole)
-        skeletons.append(joints)
-    weights = half_weights[origin]
-    weights[side < 0] = weights[side < 0][:, MIRROR]
-    middle = mirror_of == np.arange(len(mirror_of))
-    weights[middle] = (weights[middle] + weights[middle][:, MIRROR]) / 2
-
+    bodies = [
+        half.follow(vertices)[:, origin] * np.stack([side, side**2, side**2], axis=1)
+        for vertices, _ in people
+    ]
     area = vertex_areas(bodies[0].mean(0), faces)
     mean, directions = shape_space.shape_directions(*bodies, CHILD_SHARE, area)
-    regressor = fit_regressor(mean, directions, bodies, skeletons, area, mirror_of)
-    fit_vertices, fit_faces = decimate(mean, faces, N_FIT_VERTICES)
+    space = shape_space.ShapeSpace(mean, directions, area)
+    weights = mirrored_weights(strongest(half.rows @ source.weights, 4)[origin], side, mirror_of)
+    regressor = fit_regressor(space, bodies, skeletons, mirror_of)
+    save(
+        out, space, faces, weights=weights.astype(np.float32),
+        J_regressor=regressor.astype(np.float32), mirror=mirror_of.astype(np.int32),
+    )  # fmt: skip
+    report_mesh(out, space, faces)
+    report_people('adults', bodies[0], space)
+    report_people('children', bodies[1], space)
+
+
+def save(
+    out: Path, space: shape_space.ShapeSpace, faces: np.ndarray, **arrays: np.ndarray
+) -> None:
+    """Write the npz in the format of `pop_core.body.model_file`, and the mirror of each vertex."""
+    fit_vertices, fit_faces = decimate(space.mean, faces, N_FIT_VERTICES)
     np.savez_compressed(
         out,
         name='default',
         licence=LICENCE,
         provenance=PROVENANCE,
-        v_template=mean.astype(np.float32),
-        shapedirs=directions.astype(np.float16),
-        weights=weights.astype(np.float32),
-        J_regressor=regressor.astype(np.float32),
+        v_template=space.mean.astype(np.float32),
+        shapedirs=space.directions.astype(np.float16),
         parents=np.array(PARENTS, dtype=np.int32),
         f=faces.astype(np.int32),
         fit_vertices=fit_vertices.astype(np.int32),
         fit_faces=fit_faces.astype(np.int32),
-        mirror=mirror_of.astype(np.int32),
+        **arrays,
     )
-    report(out, mean, faces, directions, area)
-    for name, people in zip(('adults', 'children'), bodies, strict=True):
-        report_people(name, people, mean, directions, area)
+
+
+def mirrored_weights(
+    weights: np.ndarray, side: np.ndarray, mirror_of: np.ndarray
+) -> np.ndarray:
+    """Exchange left and right joints on the right side and balance them on the midline."""
+    out = weights.copy()
+    out[side < 0] = weights[side < 0][:, MIRROR]
+    middle = mirror_of == np.arange(len(mirror_of))
+    out[middle] = (weights[middle] + weights[middle][:, MIRROR]) / 2
+    return out
 
 
 def strongest(weights: np.ndarray, count: int) -> np.ndarray:
@@ -97,55 +111,55 @@ def vertex_areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def fit_regressor(
-    mean: np.ndarray, directions: np.ndarray, bodies: list[np.ndarray],
-    skeletons: list[np.ndarray], area: np.ndarray, mirror_of: np.ndarray,
+    space: shape_space.ShapeSpace, bodies: list[np.ndarray], skeletons: list[np.ndarray],
+    mirror_of: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """Fit the regressor to the joints' own linear dependence on the betas, and print its error."""
     joint_mean = skeletons[0].mean(0)
-    betas = [shape_space.fit_betas(people, mean, directions, area)[0] for people in bodies]
+    offsets = (np.concatenate(skeletons) - joint_mean).reshape(-1, joint_mean.size)
+    betas = [space.fit(people)[0] for people in bodies]
     share = (1 - CHILD_SHARE, CHILD_SHARE)
-    scale = [np.full(len(b), np.sqrt(s / len(b))) for b, s in zip(betas, share, strict=True)]
-    rows = np.concatenate(scale)[:, None]
-    offsets = (np.concatenate(skeletons) - joint_mean).reshape(len(rows), -1)
+    rows = np.concatenate(
+        [np.full((len(b), 1), np.sqrt(s / len(b))) for b, s in zip(betas, share, strict=True)]
+    )
     slopes = np.linalg.lstsq(np.concatenate(betas) * rows, offsets * rows, rcond=None)[0]
     joint_directions = slopes.reshape(-1, len(joint_mean), 3).transpose(1, 2, 0)
     regressor = shape_space.joint_regressor(
-        mean, directions, joint_mean, joint_directions, mirror_of, MIRROR
+        space, joint_mean, joint_directions, mirror_of, MIRROR
     )
+    straight = joint_mean + np.einsum('pb,jcb->pjc', betas[0], joint_directions)
+    bent = np.linalg.norm(straight - skeletons[0], axis=2)
+    largest = np.abs(regressor).sum(1).max()
+    print(f'joints of adults: {1e3 * bent.mean():.2f} mm from linear in the betas')
+    print(f'regressor: sum of |weights| {largest:.1f} at most')
     for name, people, joints in zip(('adults', 'children'), bodies, skeletons, strict=True):
-        error = np.linalg.norm(np.einsum('jv,pvc->pjc', regressor, people) - joints, axis=2)
-        print(
-            f'regressor, {name}: mean {1e3 * error.mean():.2f} mm, worst joint '
-            f'{1e3 * error.mean(0).max():.2f} mm, {(regressor > 0).sum(1).mean():.0f} per joint'
-        )
+        error = 1e3 * np.linalg.norm(np.einsum('jv,pvc->pjc', regressor, people) - joints, axis=2)
+        print(f'  {name}: mean {error.mean():.2f} mm, worst joint {error.mean(0).max():.2f} mm')
     return regressor
 
 
-def report(
-    out: Path, mean: np.ndarray, faces: np.ndarray, directions: np.ndarray, area: np.ndarray
-) -> None:
-    """Print size, evenness and the share of each beta."""
+def report_mesh(out: Path, space: shape_space.ShapeSpace, faces: np.ndarray) -> None:
+    """Print size, evenness, stature and the reach of each beta."""
+    mean, area = space.mean, space.area
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     edges, uses = np.unique(edges, axis=0, return_counts=True)
-    length = np.linalg.norm(mean[edges[:, 0]] - mean[edges[:, 1]], axis=1)
+    length = 1e3 * np.linalg.norm(mean[edges[:, 0]] - mean[edges[:, 1]], axis=1)
+    euler = len(mean) - len(edges) + len(faces)
     print(f'{out}: {out.stat().st_size / 1e6:.2f} MB, {len(mean)} vertices, {len(faces)} faces')
-    print(f'edges used twice: {np.mean(uses == 2):.4f}, V - E + F = {len(mean) - len(edges) + len(faces)}')
-    print(f'edge {1e3 * length.mean():.1f} mm, std/mean {length.std() / length.mean():.3f}, '
-          f'{1e3 * length.min():.1f} .. {1e3 * length.max():.1f} mm')
+    print(f'edges used twice: {np.mean(uses == 2):.4f}, V - E + F = {euler}')
+    print(f'edge {length.mean():.1f} mm, std/mean {length.std() / length.mean():.3f}')
     print(f'stature {np.ptp(mean[:, 1]):.3f} m, area {area.sum():.2f} m^2')
-    rms = np.sqrt((area[:, None, None] * directions**2).sum((0, 1)) / area.sum())
+    rms = np.sqrt((area[:, None, None] * space.directions**2).sum((0, 1)) / area.sum())
     print('mm per sigma:', ' '.join(f'{1e3 * value:.1f}' for value in rms))
 
 
-def report_people(
-    name: str, people: np.ndarray, mean: np.ndarray, directions: np.ndarray, area: np.ndarray
-) -> None:
+def report_people(name: str, people: np.ndarray, space: shape_space.ShapeSpace) -> None:
     """Print what ten betas leave over and how far the betas of these people reach."""
-    betas, left = shape_space.fit_betas(people, mean, directions, area)
+    betas, left = space.fit(people)
     stature = np.ptp(people[:, :, 1], axis=1)
-    per_person = (left * area).sum(1) / area.sum()
-    print(f'{name}: stature {stature.mean():.3f} +- {stature.std():.3f} m, residual mean '
-          f'{1e3 * per_person.mean():.2f} mm, p95 {1e3 * np.percentile(per_person, 95):.2f} mm')
+    over = 1e3 * (left * space.area).sum(1) / space.area.sum()
+    print(f'{name}: stature {stature.mean():.3f} +- {stature.std():.3f} m')
+    print(f'  residual mean {over.mean():.2f} mm, p95 {np.percentile(over, 95):.2f} mm')
     print('  beta mean', betas.mean(0).round(2), 'std', betas.std(0).round(2))
 
 

@@ -1,4 +1,4 @@
-"""Thin a triangle mesh to a subset of its own vertices by half-edge collapses (positions in metres).
+"""Thin a triangle mesh to a subset of its own vertices by half-edge collapses (metres).
 
 A vertex never moves: it is merged into a neighbour or it stays. So whatever is defined on the
 vertices of the fine mesh (skinning weights, shape directions) holds on the coarse one by indexing.
@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 # Share of an edge's length that counts as error: keeps flat regions from being emptied.
-SPREAD = 0.1
+SPREAD = 0.2
 # A collapse may turn a neighbouring face by at most acos(0.3) = 73 degrees.
 MIN_TURN_COSINE = 0.3
 
@@ -86,9 +86,9 @@ class _CollapsibleMesh:
         into_ring = _cost(quadrics, self.monomials[ring], areas, length_m2)
         into_vertex = _cost(quadrics, self.monomials[vertex], areas, length_m2)
         for other, leave, enter in zip(ring, into_ring, into_vertex, strict=True):
-            ages = self.age[vertex], self.age[other]
-            heapq.heappush(self.heap, (leave, vertex, other, *ages))
-            heapq.heappush(self.heap, (enter, other, vertex, *reversed(ages)))
+            here, there = self.age[vertex], self.age[other]
+            heapq.heappush(self.heap, (leave, vertex, other, here, there))
+            heapq.heappush(self.heap, (enter, other, vertex, there, here))
 
     def _is_legal(self, removed: int, stays: int) -> bool:
         shared = self.fans[removed] & self.fans[stays]

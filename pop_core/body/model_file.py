@@ -44,8 +44,8 @@ def load_body_model(path: Path) -> BodyModel:
     missing = [name for name in ('name', *ARRAY_NAMES) if name not in arrays]
     if missing:
         raise ModelFileError(
-            f'{path}: expected the arrays {", ".join(ARRAY_NAMES)}, found no {", ".join(missing)}; '
-            'convert SMPL, SMPL-H, SMPL-X and STAR files with `pop body import`'
+            f'{path}: expected the arrays {", ".join(ARRAY_NAMES)}, found no {", ".join(missing)}'
+            '; convert SMPL, SMPL-H, SMPL-X and STAR files with `pop body import`'
         )
     posedirs = arrays.get('posedirs')
     model = BodyModel(
@@ -122,7 +122,7 @@ def _range(indices: np.ndarray) -> str:
     return f'indices {indices.min()} to {indices.max()}' if indices.size else 'none'
 
 
-def _expect(holds: bool, where: str, expected: str, found: str) -> None:  # noqa: FBT001
+def _expect(holds: bool, where: str, expected: str, found: str) -> None:
     if not holds:
         raise ModelFileError(f'{where}: expected {expected}, found {found}')
 
@@ -143,7 +143,7 @@ def _floats(
     arrays: dict[str, np.ndarray], name: str, path: Path, axes: str
 ) -> Float[np.ndarray, '...']:
     array = arrays[name]
-    _check_axes(array, name, path, axes, 'numbers', 'fiu')
+    _check_axes(array, f'{path}: expected {name} as numbers', axes, 'fiu')
     return array.astype(np.float64)
 
 
@@ -151,13 +151,11 @@ def _integers(
     arrays: dict[str, np.ndarray], name: str, path: Path, axes: str
 ) -> Int[np.ndarray, '...']:
     array = arrays[name]
-    _check_axes(array, name, path, axes, 'integers', 'iu')
+    _check_axes(array, f'{path}: expected {name} as integers', axes, 'iu')
     return array.astype(np.int64)
 
 
-def _check_axes(
-    array: np.ndarray, name: str, path: Path, axes: str, kind_name: str, kinds: str
-) -> None:
+def _check_axes(array: np.ndarray, expected: str, axes: str, kinds: str) -> None:
     fixed = {'3': 3, 'j': N_JOINTS}
     letters = axes.split()
     fits = len(letters) == array.ndim and all(
@@ -166,6 +164,6 @@ def _check_axes(
     )
     if not fits or array.dtype.kind not in kinds:
         raise ModelFileError(
-            f'{path}: expected {name} as {kind_name} of shape ({axes}), j = {N_JOINTS}, '
+            f'{expected} of shape ({axes}) with j = {N_JOINTS}, '
             f'found {array.dtype} of shape {array.shape}'
         )

@@ -1,10 +1,33 @@
 """Ten shape directions in units of standard deviations, and a joint regressor that fits them."""
 
+from dataclasses import dataclass
+
 import numpy as np
-from scipy.optimize import nnls
 from scipy.spatial import cKDTree
 
 N_BETAS = 10
+# Vertices that each joint is regressed from.
+N_NEAREST = 400
+# Position error that a weight of one may cost: keeps the weights small, a mean of the vertices.
+WEIGHT_COST_M = 3e-3
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeSpace:
+    """The mean adult, the directions about it, and the area that each vertex stands for."""
+
+    mean: np.ndarray  # (v, 3) [m]
+    directions: np.ndarray  # (v, 3, 10) [m per sigma]
+    area: np.ndarray  # (v,) [m^2]
+
+    def fit(self, people: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return betas (p, 10) of people and the distance of each vertex (p, v) left over [m]."""
+        scale = np.sqrt(self.area)[:, None]
+        basis = (self.directions * scale[:, :, None]).reshape(-1, N_BETAS)
+        offsets = ((people - self.mean) * scale).reshape(len(people), -1)
+        betas = np.linalg.solve(basis.T @ basis, basis.T @ offsets.T).T
+        left = people - self.mean - np.einsum('vcb,pb->pvc', self.directions, betas)
+        return betas, np.linalg.norm(left, axis=2)
 
 
 def shape_directions(
@@ -30,43 +53,33 @@ def shape_directions(
     return mean, directions * np.where(outward < 0, -1.0, 1.0)
 
 
-def fit_betas(
-    people: np.ndarray, mean: np.ndarray, directions: np.ndarray, area: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the betas (p, 10) of people and the distance of each vertex (p, v) [m] left over."""
-    scale = np.sqrt(area)[:, None]
-    basis = (directions * scale[:, :, None]).reshape(-1, N_BETAS)
-    offsets = ((people - mean) * scale).reshape(len(people), -1)
-    betas = np.linalg.solve(basis.T @ basis, basis.T @ offsets.T).T
-    left = people - mean - np.einsum('vcb,pb->pvc', directions, betas)
-    return betas, np.linalg.norm(left, axis=2)
-
-
 def joint_regressor(
-    mean: np.ndarray, directions: np.ndarray, joint_mean: np.ndarray,
-    joint_directions: np.ndarray, mirror_of: np.ndarray, joint_mirror: np.ndarray,
+    space: ShapeSpace, joint_mean: np.ndarray, joint_directions: np.ndarray,
+    mirror_of: np.ndarray, joint_mirror: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
-    """Return non-negative rows (24, v) that give the joints of the shape space.
+    """Return sparse rows (24, v) that give the joints of the shape space.
 
-    Each joint is a weighted mean of about thirty of its nearest vertices, for the mean body and
-    along every direction at once; right joints take the mirrored rows of left ones.
+    Each joint is a combination of its nearest vertices, small in squares, that fits
+    the mean body and every direction at once; right joints take the mirrored rows of left ones.
     """
+    mean, directions = space.mean, space.directions
     regressor = np.zeros((len(joint_mean), len(mean)))
     for joint, twin in enumerate(joint_mirror):
         if joint > twin:
             regressor[joint, mirror_of] = regressor[twin]
             continue
-        near = cKDTree(mean).query(joint_mean[joint], k=700)[1]
+        near = cKDTree(mean).query(joint_mean[joint], k=N_NEAREST)[1]
         if joint == twin:
             near = np.union1d(near, mirror_of[near])
-        # Sum to one counts a hundred times a metre: a free body would otherwise drift.
         columns = np.concatenate([
-            mean[near].T, directions[near].transpose(1, 2, 0).reshape(-1, len(near)),
-            np.full((1, len(near)), 100.0),
+            mean[near].T,
+            directions[near].transpose(1, 2, 0).reshape(-1, len(near)),
+            np.ones((1, len(near))),
+            WEIGHT_COST_M * np.eye(len(near)),
         ])
-        goal = np.concatenate([joint_mean[joint], joint_directions[joint].ravel(), [100.0]])
-        weights = nnls(columns, goal)[0]
-        regressor[joint, near] = weights / weights.sum()
+        goal = np.concatenate([joint_mean[joint], joint_directions[joint].ravel(), [1.0]])
+        goal = np.concatenate([goal, np.zeros(len(near))])
+        regressor[joint, near] = np.linalg.lstsq(columns, goal, rcond=None)[0]
         if joint == twin:
             regressor[joint] = (regressor[joint] + regressor[joint, mirror_of]) / 2
     return regressor

@@ -14,6 +14,8 @@ import trimesh
 from anny.shape_distribution import SimpleShapeDistribution
 from scipy.sparse import csr_matrix
 
+from pop_core.body.joints import MIRROR
+
 # Driving bone of each of the 24 joints (joint order of the package), left side for pairs.
 JOINT_BONES = (
     'root', 'upperleg01.L', 'upperleg01.R', 'spine04', 'lowerleg01.L', 'lowerleg01.R',
@@ -59,6 +61,7 @@ def load_source() -> Source:
     used = np.unique(faces)
     weights = rows[used] @ _merged_weights(model)
     on_plane = np.abs(rows[used] @ vertices[:, 0]) < 1e-5
+    weights[on_plane] = (weights[on_plane] + weights[on_plane][:, MIRROR]) / 2
     return Source(model, rows[used], np.searchsorted(used, faces), weights, on_plane)
 
 

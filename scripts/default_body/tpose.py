@@ -3,15 +3,14 @@
 import numpy as np
 
 from default_body.source import JOINT_BONES, People
-from pop_core.body.joints import JOINT_INDEX, PARENTS
+from pop_core.body.joints import JOINT_INDEX, MIRROR, PARENTS
 
+FLIP = np.diag([-1.0, 1.0, 1.0])
 # Thighs stand a little apart, as in SMPL's template; shins are vertical.
 THIGH_OUT_RAD = np.deg2rad(3.0)
 
 
-def to_tpose(
-    people: People, half_vertices: np.ndarray, weights: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def to_tpose(people: People, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return half vertices (p, n, 3) and the 24 joints (p, 24, 3) in T-pose, pelvis at 0 [m].
 
     Each person is turned by its own bone directions, so that differences of rest pose between
@@ -19,19 +18,20 @@ def to_tpose(
     """
     heads = np.stack([people.bone_heads[bone] for bone in JOINT_BONES], axis=1)
     heads = _symmetric(heads)
-    rotations = _left_rotations(people, heads)
+    rotations = _outer_rotations(people, heads)
     placed = _placed_joints(heads, rotations)
-    vertices = np.zeros_like(half_vertices)
+    vertices = np.zeros_like(people.half_vertices)
     for joint in np.flatnonzero(weights.any(0)):
         R, start, end = rotations[:, joint], heads[:, joint, None], placed[:, joint, None]
-        carried = (half_vertices - start) @ R.transpose(0, 2, 1) + end
+        carried = (people.half_vertices - start) @ R.transpose(0, 2, 1) + end
         vertices += weights[:, joint, None] * carried
-    joints = _symmetric(placed, left_is_right_too=True)
-    pelvis = joints[:, None, 0]
-    return vertices - pelvis, joints - pelvis
+    pelvis = placed[:, None, 0]
+    on_plane = (people.half_vertices[:, :, 0] == 0).all(0)
+    vertices[:, on_plane, 0] = 0.0
+    return vertices - pelvis, placed - pelvis
 
 
-def _symmetric(joints: np.ndarray, *, left_is_right_too: bool = False) -> np.ndarray:
+def _symmetric(joints: np.ndarray) -> np.ndarray:
     """Put midline joints on x = 0 and right joints where the left ones mirror to."""
     out = joints.copy()
     for name, index in JOINT_INDEX.items():
@@ -43,8 +43,8 @@ def _symmetric(joints: np.ndarray, *, left_is_right_too: bool = False) -> np.nda
     return out
 
 
-def _left_rotations(people: People, heads: np.ndarray) -> np.ndarray:
-    """Return the outer rotation of each joint (p, 24, 3, 3) that straightens the left limbs."""
+def _outer_rotations(people: People, heads: np.ndarray) -> np.ndarray:
+    """Return the outer rotation of each joint (p, 24, 3, 3) that straightens the limbs."""
     at = {name: heads[:, index] for name, index in JOINT_INDEX.items()}
     upper = at['left_elbow'] - at['left_shoulder']
     fore = at['left_wrist'] - at['left_elbow']
@@ -52,19 +52,20 @@ def _left_rotations(people: People, heads: np.ndarray) -> np.ndarray:
     # Elbows bend forward in T-pose: about -y on the left side. Thumbs point forward.
     bend = np.cross(upper, fore)
     index_side = people.bone_heads['finger2-1.L'] - people.bone_heads['finger5-1.L']
-    along, bend_axis, forward = np.array([1.0, 0, 0]), np.array([0, -1.0, 0]), np.array([0, 0, 1.0])
+    along, down, forward = np.diag([1.0, -1.0, 1.0])
     thigh = np.array([np.sin(THIGH_OUT_RAD), -np.cos(THIGH_OUT_RAD), 0.0])
     turned = {
-        'left_shoulder': _frame_to_frame(upper, bend, along, bend_axis),
-        'left_elbow': _frame_to_frame(fore, bend, along, bend_axis),
+        'left_shoulder': _frame_to_frame(upper, bend, along, down),
+        'left_elbow': _frame_to_frame(fore, bend, along, down),
         'left_wrist': _frame_to_frame(hand, index_side, along, forward),
         'left_hip': _swing(at['left_knee'] - at['left_hip'], thigh),
-        'left_knee': _swing(at['left_ankle'] - at['left_knee'], np.array([0, -1.0, 0])),
+        'left_knee': _swing(at['left_ankle'] - at['left_knee'], down),
     }
     turned['left_hand'] = turned['left_wrist']
     rotations = np.broadcast_to(np.eye(3), (len(heads), 24, 3, 3)).copy()
     for name, R in turned.items():
         rotations[:, JOINT_INDEX[name]] = R
+        rotations[:, MIRROR[JOINT_INDEX[name]]] = FLIP @ R @ FLIP
     return rotations
 
 
