@@ -1,0 +1,124 @@
+"""`pop fit`: RGB-D frames on disk in, one folder of results per frame out."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pop_core.errors import PopError
+
+if TYPE_CHECKING:
+    from pop_core.pipeline import BodyPipeline
+    from pop_ros.fit_keypoints import FrameKeypoints
+    from pop_ros.frame_folder import FrameFolder
+
+BAD_INPUT = 2
+
+
+def fit(
+    inputs: Annotated[list[Path], typer.Argument(
+        metavar='INPUT...',
+        help='Folder with color.png, depth.png (16 bit, mm) and camera.json (here or in its '
+             'parent folder), or a folder of such folders.')],
+    out: Annotated[Path, typer.Option('--out', help='Folder for the results.')],
+    keypoints: Annotated[str | None, typer.Option(
+        '--keypoints', metavar='SOURCE',
+        help='json (keypoints.json of each frame) or the path of an ONNX network. '
+             'Without it, keypoints.json.')] = None,
+    decoder: Annotated[str | None, typer.Option(
+        '--decoder', metavar='NAME',
+        help='How to read a network whose outputs do not tell.')] = None,
+    body: Annotated[Path | None, typer.Option(
+        '--body', metavar='FILE', help='Body model made by "pop body import".')] = None,
+    library: Annotated[Path | None, typer.Option(
+        '--library', metavar='FILE', help='Pose library made by "pop library build".')] = None,
+    settings: Annotated[list[str] | None, typer.Option(
+        '--set', metavar='NAME=VALUE',
+        help='Change a setting, as in docs/parameters.md; may be repeated.')] = None,
+) -> None:
+    """Fit the people of RGB-D frames: mesh, joints, mask and uncertainty of each.
+
+    Each frame gets a folder OUT/NAME with one person_K.npz per person, result.json and
+    overlay.png. A frame without people is no error.
+
+    An input that cannot be read gets one line, the others are still done, and the exit code is 2.
+
+    One frame, keypoints from a network:
+
+      pop fit five_people --out results --keypoints posenet.onnx
+
+    All frames below a folder, each with its own keypoints.json, two people at most:
+
+      pop fit recordings/ --out results --set max_people=2
+    """
+    from pop_core.config import PipelineConfig
+    from pop_ros.fit_keypoints import FrameKeypoints
+    from pop_ros.settings_flags import with_flags
+    from pop_ros.sources import make_pipeline
+
+    config = with_flags(PipelineConfig(), settings or [])
+    source = FrameKeypoints(keypoints, decoder)
+    frames, bad = _collect(inputs)
+    if frames:
+        pipeline = make_pipeline(source, config, body, library)
+        bad += _fit_all(frames, pipeline, source, out)
+    raise typer.Exit(BAD_INPUT if bad else 0)
+
+
+def _collect(inputs: Sequence[Path]) -> tuple[list[FrameFolder], int]:
+    """Return the frames of all inputs, and how many inputs were refused."""
+    from pop_ros.frame_folder import find_frames
+
+    frames: dict[Path, FrameFolder] = {}
+    bad = 0
+    for path in inputs:
+        try:
+            found = find_frames(path)
+        except (PopError, OSError) as error:
+            bad += _complain(error)
+            continue
+        for folder in found:
+            first = frames.setdefault(folder.name, folder)
+            if first.path.resolve() != folder.path.resolve():
+                bad += _complain(
+                    f'{folder.path}: expected a name of its own, found {folder.name}, which is '
+                    f'also the name of {first.path}: give it another --out')
+    return list(frames.values()), bad
+
+
+def _fit_all(
+    frames: Sequence[FrameFolder], pipeline: BodyPipeline, source: FrameKeypoints, out: Path
+) -> int:
+    """Fit and write all frames; return how many could not be."""
+    from rich.console import Console
+    from rich.progress import track
+
+    from pop_ros.frame_folder import load_frame
+    from pop_ros.result_folder import status_sentence, write_results
+
+    console = Console(stderr=True)
+    bad = 0
+    for folder in track(
+        frames, 'Fitting', console=console, transient=True, disable=not console.is_terminal
+    ):
+        try:
+            source.choose(folder)
+            frame = load_frame(folder.path)
+            result = pipeline.process(frame)
+            write_results(out / folder.name, frame, result, pipeline.model)
+        except (PopError, OSError) as error:
+            bad += _complain(error)
+            continue
+        seconds = sum(result.times_ms.values()) / 1e3
+        typer.echo(f'{folder.name}: {status_sentence(result)} ({seconds:.2f} s)')
+    return bad
+
+
+def _complain(error: Exception | str) -> int:
+    """Say what was wrong with one input; return 1, to be counted."""
+    sys.stderr.write(f'pop fit: {" ".join(str(error).split())}\n')
+    return 1
