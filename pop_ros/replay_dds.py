@@ -1,0 +1,179 @@
+"""Play a bag over DDS to a node in another process and record what it publishes."""
+
+from __future__ import annotations
+
+import signal
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import CameraInfo, Image
+
+from pop_core.errors import PopError
+from pop_ros.bag_reader import BagReader
+from pop_ros.bag_topics import RgbdTopics
+from pop_ros.bag_writer import BagWriter
+from pop_ros.body_messages import OUTPUT_TYPES
+from pop_ros.diagnostics import DROP_PREFIX, read_values
+from pop_ros.inputs import COLOR, DEPTH, INFO
+from pop_ros.node_arguments import SourceArguments
+from pop_ros.qos import output_qos
+from pop_ros.replay import KINDS, OUTPUT_NAMESPACE, ReplaySummary, announce_outputs
+
+READY_S = 900.0  # a first start generates the pose library
+IDLE_S = 300.0  # the frame in work and the one that waits
+SETTLE_S = 2.5  # two reports of the node must agree that nothing is pending
+STOP_S = 15.0
+NODE_NAME = '/pop'
+
+
+class ReplayError(PopError):
+    """A node that does not come up, or ends while a bag is played."""
+
+
+class NodeProcess:
+    """The node in a process of its own."""
+
+    def __init__(self, sources: SourceArguments, slop_s: float) -> None:
+        """Start it; it inherits the environment, so both sides share domain and RMW."""
+        command = [
+            sys.executable, '-m', 'pop_ros.node', *sources.as_flags(),
+            '--ros-args', '-p', f'sync.slop_s:={float(slop_s)}']
+        self._process = subprocess.Popen(command)
+
+    def check(self) -> None:
+        """Raise ReplayError if it has ended."""
+        code = self._process.poll()
+        if code is not None:
+            raise ReplayError(f'replay: expected the node to run, found that it ended with {code}')
+
+    def stop(self) -> int:
+        """Ask it to end as Ctrl-C does; return its exit code."""
+        if self._process.poll() is None:
+            self._process.send_signal(signal.SIGINT)
+        try:
+            return self._process.wait(STOP_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            return self._process.wait()
+
+
+class DdsPlayer:
+    """Publishes a bag's images and records the node's outputs."""
+
+    def __init__(self, writer: BagWriter, check: Callable[[], None]) -> None:
+        """Join the ROS graph; `check` raises when there is no point in going on."""
+        self._writer, self._check = writer, check
+        self._values: dict[str, str] = {}
+        self._context = Context()
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = Node('pop_replay', context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        kinds = {COLOR: Image, DEPTH: Image, INFO: CameraInfo}
+        self._publishers = {
+            role: self._node.create_publisher(kind, role, 10) for role, kind in kinds.items()}
+        for name, kind in OUTPUT_TYPES.items():
+            self._node.create_subscription(
+                kind, f'{OUTPUT_NAMESPACE}/{name}', self._recorder(name), output_qos(), raw=True)
+        self._node.create_subscription(DiagnosticArray, '/diagnostics', self._on_report, 10)
+        announce_outputs(writer)
+
+    def __enter__(self) -> DdsPlayer:
+        """Return the player."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Leave the ROS graph."""
+        self._executor.shutdown()
+        self._node.destroy_node()  # type: ignore[no-untyped-call]
+        rclpy.shutdown(context=self._context)
+
+    def wait_until_subscribed(self, timeout_s: float = READY_S) -> None:
+        """Wait until the node has subscribed all inputs, which it does once it is ready.
+
+        Raises:
+            ReplayError: If it does not within `timeout_s`.
+        """
+        def is_ready() -> bool:
+            return all(p.get_subscription_count() for p in self._publishers.values())
+
+        if not self._spin(timeout_s, is_ready):
+            raise ReplayError(
+                f'replay: expected a node that subscribes {", ".join(self._publishers)} within '
+                f'{timeout_s:.0f} s, found none: is it running in this ROS_DOMAIN_ID?')
+
+    def play(
+        self, bag: BagReader, topics: RgbdTopics, rate: float, on_message: Callable[[], None]
+    ) -> int:
+        """Publish the bag's messages at `rate` times their own pace; return their number."""
+        roles = {topics.color: COLOR, topics.depth: DEPTH, topics.info: INFO}
+        started_s = first_ns = None
+        count = 0
+        for message in bag.messages(topics.all):
+            if started_s is None or first_ns is None:
+                started_s, first_ns = time.monotonic(), message.time_ns
+            due_s = started_s + (message.time_ns - first_ns) / 1e9 / rate
+            self._spin(due_s - time.monotonic(), lambda: False)
+            self._publishers[roles[message.topic]].publish(message.data)
+            count += 1
+            on_message()
+        return count
+
+    def finish(self, summary: ReplaySummary) -> None:
+        """Wait until the node has nothing left to do and take over its counts."""
+        settled_at: list[float] = []
+
+        def is_idle() -> bool:
+            idle = self._values.get('pending') == '0'
+            if not idle:
+                settled_at.clear()
+            elif not settled_at:
+                settled_at.append(time.monotonic())
+            return idle and time.monotonic() - settled_at[0] > SETTLE_S
+
+        self._values.clear()
+        if not self._spin(IDLE_S, is_idle):
+            summary.notes.append(f'the node was still busy after {IDLE_S:.0f} s')
+        summary.pairs = int(self._values.get('pairs', 0))
+        summary.frames = int(self._values.get('frames', 0))
+        summary.people = int(self._values.get('people', 0))
+        summary.latency_text = self._values.get('latency (pair to published)', '-')
+        for key, value in self._values.items():
+            if key.startswith(DROP_PREFIX):
+                summary.drops[key[len(DROP_PREFIX):]] = int(value)
+
+    def _spin(self, timeout_s: float, done: Callable[[], bool]) -> bool:
+        """Handle messages until `done` or the time is over; return whether it was done."""
+        end_s = time.monotonic() + timeout_s
+        while not (finished := done()):
+            left_s = end_s - time.monotonic()
+            if left_s <= 0:
+                return False
+            self._check()
+            self._executor.spin_once(timeout_sec=min(left_s, 0.05))
+        return finished
+
+    def _recorder(self, name: str) -> Callable[[bytes], None]:
+        def record(data: bytes) -> None:
+            # Every output starts with a header, and that with its stamp.
+            sec, nanosec = struct.unpack_from('<iI', data, 4)
+            time_ns = sec * 1_000_000_000 + nanosec
+            self._writer.write(f'{OUTPUT_NAMESPACE}/{name}', KINDS[name], time_ns, bytes(data))
+        return record
+
+    def _on_report(self, message: Any) -> None:
+        self._values = read_values(message, NODE_NAME) or self._values
