@@ -57,6 +57,7 @@ def fit(
     """
     from pop_core.config import PipelineConfig
     from pop_ros.fit_keypoints import FrameKeypoints
+    from pop_ros.progress import first_use_progress
     from pop_ros.settings_flags import with_flags
     from pop_ros.sources import make_pipeline
 
@@ -64,7 +65,8 @@ def fit(
     source = FrameKeypoints(keypoints, decoder)
     frames, bad = _collect(inputs)
     if frames:
-        pipeline = make_pipeline(source, config, body, library)
+        with first_use_progress() as progress:
+            pipeline = make_pipeline(source, config, body, library, progress)
         bad += _fit_all(frames, pipeline, source, out)
     raise typer.Exit(BAD_INPUT if bad else 0)
 
@@ -94,27 +96,23 @@ def _fit_all(
     frames: Sequence[FrameFolder], pipeline: BodyPipeline, source: FrameKeypoints, out: Path
 ) -> int:
     """Fit and write all frames; return how many could not be."""
-    from rich.console import Console
-    from rich.progress import track
-
     from pop_ros.frame_folder import load_frame
+    from pop_ros.progress import terminal_progress
     from pop_ros.result_folder import status_sentence, write_results
 
-    console = Console(stderr=True)
     bad = 0
-    for folder in track(
-        frames, 'Fitting', console=console, transient=True, disable=not console.is_terminal
-    ):
-        try:
-            source.choose(folder)
-            frame = load_frame(folder.path)
-            result = pipeline.process(frame)
-            write_results(out / folder.name, frame, result, pipeline.model)
-        except (PopError, OSError) as error:
-            bad += _complain(error)
-            continue
-        seconds = sum(result.times_ms.values()) / 1e3
-        typer.echo(f'{folder.name}: {status_sentence(result)} ({seconds:.2f} s)')
+    with terminal_progress() as display:
+        for folder in display.track(frames, description='Fitting'):
+            try:
+                source.choose(folder)
+                frame = load_frame(folder.path)
+                result = pipeline.process(frame)
+                write_results(out / folder.name, frame, result, pipeline.model)
+            except (PopError, OSError) as error:
+                bad += _complain(error)
+                continue
+            seconds = sum(result.times_ms.values()) / 1e3
+            typer.echo(f'{folder.name}: {status_sentence(result)} ({seconds:.2f} s)')
     return bad
 
 

@@ -69,8 +69,17 @@ def make_pipeline(
     from pop_core.retrieval.library_file import load_library
 
     model = default_body() if body_file is None else load_body_model(body_file)
-    library = default_library(progress) if library_file is None else load_library(library_file)
+    told = None if progress is None else _as_counter(progress)
+    library = default_library(told) if library_file is None else load_library(library_file)
     return BodyPipeline(model, library, detector, config)
+
+
+def _as_counter(progress: Progress) -> Callable[[int, int], None]:
+    def told(done: int, wanted: int) -> None:
+        share = done / max(wanted, 1)
+        progress(share, f'generating the pose library: {done} of {wanted} poses')
+
+    return told
 
 
 def _json_detector(folder: Path | None) -> KeypointDetector:

@@ -16,7 +16,7 @@ from pop_core.rendering.shading import shade
 
 OPACITY = 0.72
 SHIFT = 4  # fractional bits of cv2's coordinates: joints are drawn where they are
-AROUND_JOINT_M = 0.035
+AROUND_JOINT_M = 0.024
 
 
 def draw_people(
@@ -78,7 +78,7 @@ def draw_skeleton(
             cv2.line(picture, start, end, PAPER, width, cv2.LINE_AA, SHIFT)
     for point, state, z in zip(uv, joint_state, joints_camera[:, 2], strict=True):
         if np.isfinite(point).all():
-            radius = float(np.clip(AROUND_JOINT_M * camera.fx / z, 2.5, 9.0))
+            radius = float(np.clip(AROUND_JOINT_M * camera.fx / z, 2.5, 7.0))
             filled = state == JointState.VISIBLE
             _draw_joint(picture, point, radius, width, filled=filled)
 
