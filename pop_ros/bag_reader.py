@@ -17,7 +17,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 from pop_core.errors import PopError
-from pop_ros.bag_salvage import SalvagedMessage, is_ros1_bag, salvage
+from pop_ros.bag_salvage import is_ros1_bag, salvage
 
 SUFFIXES = ('.bag', '.db3', '.mcap')
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -85,6 +85,8 @@ class BagReader:
             BagError: If nothing in it can be read.
         """
         try:
+            if self.path.suffix == '.active':
+                raise BagError('its recorder never finished it')
             reader = AnyReader(self.files, default_typestore=STORE)
             reader.open()
         except Exception as error:  # noqa: BLE001 - rosbags passes on what its storages raise
@@ -120,10 +122,13 @@ class BagReader:
         except Exception as error:  # noqa: BLE001 - rosbags passes on what its storages raise
             self.damage = f'{error}'.rstrip('.') or type(error).__name__
 
+    def _storage_files(self) -> list[Path]:
+        return _storages(self.path) if self.path.is_dir() else [self.path]
+
     def _salvaged_topics(self) -> list[BagTopic]:
         counts: Counter[tuple[str, str]] = Counter()
-        for path in self.files:
-            counts.update((m.topic, m.kind) for m in _salvage(path))
+        for path in self._storage_files():
+            counts.update((m.topic, m.kind) for m in salvage(path))
         if not counts:
             raise BagError(
                 f'{self.path}: expected a bag ({", ".join(SUFFIXES)} or a rosbag2 folder), found '
@@ -131,16 +136,11 @@ class BagReader:
         return [BagTopic(*key, count) for key, count in sorted(counts.items())]
 
     def _salvaged(self, topics: Collection[str]) -> Iterator[BagMessage]:
-        for path in self.files:
-            for m in _salvage(path):
+        for path in self._storage_files():
+            for m in salvage(path):
                 if m.topic in topics:
                     data = _as_cdr(m.data, m.kind, is_ros2=not is_ros1_bag(path))
                     yield BagMessage(m.topic, m.kind, m.time_ns, data)
-
-
-def _salvage(path: Path) -> Iterator[SalvagedMessage]:
-    # SQLite cannot be walked without its index; rosbags reads as much of it as there is.
-    return salvage(path) if is_ros1_bag(path) or path.suffix == '.mcap' else iter(())
 
 
 def _as_cdr(raw: bytes | memoryview, kind: str, *, is_ros2: bool) -> bytes:
@@ -152,8 +152,12 @@ def _files(path: Path) -> list[Path]:
         raise BagError(f'{path}: expected a bag, found nothing there')
     if path.is_file() or (path / 'metadata.yaml').is_file():
         return [path]
-    found = sorted(p for p in path.iterdir() if p.suffix in SUFFIXES)
+    found = _storages(path)
     if not found:
         raise BagError(
             f'{path}: expected a rosbag2 folder, found no {" or ".join(SUFFIXES)} in it')
     return found
+
+
+def _storages(folder: Path) -> list[Path]:
+    return sorted(p for p in folder.iterdir() if p.suffix in SUFFIXES)

@@ -1,18 +1,22 @@
 """Read what is left of a bag whose recorder died: no index, cut in the middle of a record.
 
-Both formats are sequences of records that can be walked from the start. ROS 1 bags (format 2.0):
-header fields and data, each with a length. MCAP: opcode, length, content.
+ROS 1 bags and MCAP are sequences of records that can be walked from the start. ROS 1 (format 2.0):
+header fields and data, each with a length. MCAP: opcode, length, content. SQLite gives the rows
+of a table up to the first page that is missing or wrong.
 """
 
 from __future__ import annotations
 
 import bz2
+import sqlite3
 import struct
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
+from urllib.parse import quote
 
 import lz4.frame  # type: ignore[import-untyped]
 
@@ -49,7 +53,10 @@ def is_ros1_bag(path: Path) -> bool:
 
 
 def salvage(path: Path) -> Iterator[SalvagedMessage]:
-    """Yield the whole messages of a damaged .bag or .mcap file up to the damage."""
+    """Yield the whole messages of a damaged .bag, .mcap or .db3 file up to the damage."""
+    if path.suffix == '.db3':
+        yield from _walk_sqlite(path)
+        return
     with path.open('rb') as file:
         if is_ros1_bag(path):
             if file.read(len(ROS1_MAGIC)) == ROS1_MAGIC:
@@ -111,6 +118,17 @@ def _walk_mcap(
                 number, _, time_ns, _ = struct.unpack('<HIQQ', _exactly(record, 22))
                 yield SalvagedMessage(*topics[number], time_ns, record.read())
     except (_CutOffError, KeyError, ValueError, RuntimeError, OSError):
+        return  # whatever follows the damage cannot be trusted
+
+
+def _walk_sqlite(path: Path) -> Iterator[SalvagedMessage]:
+    query = ('SELECT topics.name, topics.type, messages.timestamp, messages.data FROM messages '
+             'JOIN topics ON messages.topic_id = topics.id ORDER BY messages.id')
+    try:
+        with closing(sqlite3.connect(f'file:{quote(str(path))}?mode=ro', uri=True)) as database:
+            for row in database.execute(query):
+                yield SalvagedMessage(*row)
+    except sqlite3.Error:
         return  # whatever follows the damage cannot be trusted
 
 

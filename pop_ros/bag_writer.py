@@ -76,7 +76,7 @@ class BagWriter:
 def cdr_to_ros1(data: bytes, kind: str) -> bytes:
     """Return a message of ROS 2 as ROS 1 serialises it; fields ROS 1 does not have are dropped."""
     if kind not in EXTENDED_IN_ROS2:
-        return bytes(ROS1_STORE.cdr_to_ros1(data, kind))
+        return bytes(STORE.cdr_to_ros1(data, kind))
     message = _as_ros1(STORE.deserialize_cdr(data, kind))
     return bytes(ROS1_STORE.serialize_ros1(message, kind))
 

@@ -52,5 +52,5 @@ def _write_ros1(path: Path, entries: Iterable[Entry]) -> Path:
             if topic not in topics:
                 topics[topic] = bag.add_connection(topic, kind, typestore=ROS1_STORE)
             cdr = STORE.serialize_cdr(message, kind, little_endian=True)
-            bag.write(topics[topic], time_ns, bytes(ROS1_STORE.cdr_to_ros1(cdr, kind)))
+            bag.write(topics[topic], time_ns, bytes(STORE.cdr_to_ros1(cdr, kind)))
     return path
