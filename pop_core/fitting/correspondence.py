@@ -13,7 +13,7 @@ from pop_core.fitting.residuals import Pairs, join_pairs, no_pairs
 from pop_core.fitting.robust_loss import geman_mcclure_weight
 
 SKIN_SIGMA_M = 0.010  # clothes, hair and the coarse mesh: never trust a point more than this
-EFFECTIVE_POINTS = 300.0  # neighbouring pixels err together; so many are worth independent ones
+EFFECTIVE_POINTS = 1000.0  # neighbouring pixels err together; so many are worth independent ones
 VERTEX_SHARE = 0.3  # weight of vertex-to-point pairs beside point-to-vertex pairs
 
 

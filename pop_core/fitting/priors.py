@@ -18,7 +18,7 @@ from pop_core.geometry.rotation import from_rotvec, left_jacobian_inverse, to_ro
 from pop_core.retrieval.candidate import PoseCandidate
 from pop_core.retrieval.pose_prior import PosePrior
 
-SCALE_SIGMA = 0.06  # log scale; the betas hold adults, scale is for children and giants
+SCALE_SIGMA = 0.04  # log scale; the betas hold adults, scale is for children and giants
 LIMIT_SIGMA_RAD = 0.05
 
 

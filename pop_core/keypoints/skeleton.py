@@ -34,3 +34,8 @@ TORSO = np.array([
     SHARED_INDEX[name] for name in
     ('pelvis', 'neck', 'left_hip', 'right_hip', 'left_shoulder', 'right_shoulder')
 ])
+# Joints whose left and right are easily taken for one.
+LIMB_ENDS = np.array([
+    SHARED_INDEX[f'{side}_{name}'] for side in ('left', 'right')
+    for name in ('knee', 'ankle', 'elbow', 'wrist')
+])

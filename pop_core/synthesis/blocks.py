@@ -15,6 +15,8 @@ from jaxtyping import Float, Int
 CELL_M = 0.3  # the rasteriser drops triangles that touch the camera plane: keep them small
 SIDES = 20
 
+Lengths = Sequence[float | int]  # three of them [m]
+
 
 class Shape(IntEnum):
     """Form of a block within its bounding box."""
@@ -79,7 +81,7 @@ def yaw_matrix(yaw_rad: float) -> Float[np.ndarray, '3 3']:
 
 
 def box(
-    size_m: Sequence[float], base: Sequence[float], colour: Float[np.ndarray, '3'],
+    size_m: Lengths, base: Lengths, colour: Float[np.ndarray, '3'],
     texture: Texture = Texture.PLAIN,
 ) -> Block:
     """Return a box aligned with the room, standing on the centre of its underside."""
@@ -87,14 +89,14 @@ def box(
 
 
 def cylinder(
-    size_m: Sequence[float], base: Sequence[float], colour: Float[np.ndarray, '3']
+    size_m: Lengths, base: Lengths, colour: Float[np.ndarray, '3']
 ) -> Block:
     """Return an upright cylinder of the given extents."""
     return Block(Shape.CYLINDER, np.array(size_m, float), np.array(base, float), 0.0, colour)
 
 
 def ellipsoid(
-    size_m: Sequence[float], base: Sequence[float], colour: Float[np.ndarray, '3']
+    size_m: Lengths, base: Lengths, colour: Float[np.ndarray, '3']
 ) -> Block:
     """Return an ellipsoid of the given extents, lying on `base`."""
     return Block(Shape.ELLIPSOID, np.array(size_m, float), np.array(base, float), 0.0, colour)

@@ -36,15 +36,14 @@ def draw_outfit(
 ) -> Outfit:
     """Return random clothes, 0 to `thickest_m` from the skin [m]."""
     sleeves, legs = rng.choice(['short', 'long']), rng.choice(['short', 'long'], p=[0.2, 0.8])
-    top = rng.uniform(0.003, thickest_m * 0.75)
-    bottom = rng.uniform(0.003, thickest_m * 0.6)
+    top, bottom = thickest_m * rng.uniform([0.1, 0.1], [0.75, 0.6])
     thickness = np.zeros(len(JOINT_NAMES))
     _dress(thickness, _TORSO, top)
     _dress(thickness, _SLEEVES, top * 0.7 if sleeves == 'long' else 0.0)
     _dress(thickness, ('left_shoulder', 'right_shoulder'), top * 0.8)
     _dress(thickness, ('left_hip', 'right_hip'), bottom)
     _dress(thickness, ('left_knee', 'right_knee'), bottom if legs == 'long' else 0.0)
-    _dress(thickness, _SHOES, 0.008)
+    _dress(thickness, _SHOES, thickest_m * 0.2)
     folds = 1.0 + 0.5 * smooth_noise(model.v_template, rng)
     displacement = (model.weights @ thickness) * folds
     hair = hair_share(model) * rng.uniform(0.0, 0.03)

@@ -97,5 +97,5 @@ def _inside(
     keypoints: Float[np.ndarray, '15 2'], camera: Camera
 ) -> Bool[np.ndarray, '15']:
     last = [camera.width - 1, camera.height - 1]
-    return ((keypoints >= 0) & (keypoints <= last)).all(axis=1)
+    return np.all((keypoints >= 0) & (keypoints <= last), axis=1)
 

@@ -35,6 +35,7 @@ class SceneConfig:
         occluders: Fewest and most things put between camera and people.
         clutter: Most things along the walls.
         child_share: Share of children.
+        bare_share: Share of people without clothes, whose T-pose can be compared with truth.
         sensors: Presets of sensor noise, one drawn per scene; empty leaves depth perfect.
         cameras: What cameras are drawn from.
     """
@@ -47,6 +48,7 @@ class SceneConfig:
     occluders: tuple[int, int] = (1, 2)
     clutter: int = 5
     child_share: float = 0.1
+    bare_share: float = 0.25
     sensors: tuple[str, ...] = ('structured_light', 'stereo', 'time_of_flight')
     cameras: CameraRange = field(default_factory=CameraRange)
 
@@ -80,7 +82,7 @@ def draw_layout(
     actors = _draw_people(model, config, rng)
     if actors is None:
         return None
-    target = joints(model, actors[0].parameters).mean(axis=0)
+    target = _middle(model, actors)
     camera, T_camera_room = draw_camera(target, config.cameras, rng)
     eye = invert_transform(T_camera_room)[:3, 3]
     clutter = draw_clutter(room, rng, int(rng.integers(0, config.clutter + 1)))
@@ -123,7 +125,8 @@ def _draw_people(
     actors: list[Actor] = []
     for k in range(count):
         kind = str(rng.choice(kinds, p=np.array(shares) / sum(shares)))
-        actor = draw_actor(model, kind, rng, child=bool(rng.random() < config.child_share))
+        child, bare = rng.random(2) < [config.child_share, config.bare_share]
+        actor = draw_actor(model, kind, rng, child=bool(child), bare=bool(bare))
         # Most people face the camera side, but backs are seen too.
         yaw = rng.normal(0, 0.9) if rng.random() < 0.75 else rng.uniform(-np.pi, np.pi)
         for _ in range(12):
@@ -139,6 +142,13 @@ def _draw_people(
     return tuple(actors)
 
 
+def _middle(model: BodyModel, actors: Sequence[Actor]) -> Float[np.ndarray, '3']:
+    """Return what the camera looks at [m]: the first person, or where one would stand."""
+    if not actors:
+        return np.array([0.0, 0.9, 0.0])
+    return np.asarray(joints(model, actors[0].parameters).mean(axis=0))
+
+
 def _apart(first: Actor, second: Actor) -> bool:
     """Return whether two people and their seats keep clear of each other."""
     near, _ = cKDTree(second.surface[::6]).query(first.surface[::6])
@@ -152,6 +162,8 @@ def _draw_occluders(
     rng: np.random.Generator,
 ) -> tuple[Block, ...] | None:
     """Return furniture that hides the wanted share of some person's joints, or None."""
+    if not actors:
+        return ()
     low, high = config.hidden_share
     for _ in range(25):
         blocks: tuple[Block, ...] = ()

@@ -15,8 +15,9 @@ from pop_core.geometry.transform import make_transform, transform_points
 from pop_core.synthesis.blocks import Block, depth_inside, moved, yaw_matrix
 from pop_core.synthesis.clothes import Outfit, draw_outfit, dressed
 from pop_core.synthesis.occluders import SeatFit, bed_for, chair_for, sofa_for, stool_for
-from pop_core.synthesis.poses import ScenePose, draw_pose
+from pop_core.synthesis.poses import draw_pose
 
+THICKEST_M = 0.04  # cloth over skin
 SINK_M = 0.012      # flesh and cushions give way
 CARRIED_M = 0.06     # highest that a lying trunk may be above its bed
 TOLERANCE_M = 0.03  # deepest that a body may lie inside what carries it
@@ -44,18 +45,20 @@ class Actor:
 
 
 def draw_actor(
-    model: BodyModel, kind: str, rng: np.random.Generator, child: bool = False
+    model: BodyModel, kind: str, rng: np.random.Generator, *, child: bool = False,
+    bare: bool = False,
 ) -> Actor:
     """Return a person above the origin, heading along +z, on the floor or on their own seat."""
     betas = np.clip(rng.normal(size=model.n_betas), -2.0, 2.0)
     scale = float(rng.uniform(0.62, 0.85)) if child else 1.0
-    outfit = draw_outfit(model, rng)
+    outfit = draw_outfit(model, rng, 0.0 if bare else THICKEST_M)
     for _ in range(20):
         pose = draw_pose(model, kind, rng)
-        actor = _settled(model, pose, betas, scale, outfit, rng)
+        parameters = BodyParameters(np.zeros(3), pose.tilt, pose.body_pose, betas, scale)
+        actor = _settled(model, pose.kind, parameters, outfit, rng)
         if actor is not None:
             return actor
-    return draw_actor(model, 'standing', rng, child)
+    return draw_actor(model, 'standing', rng, child=child, bare=bare)
 
 
 def actor_at(
@@ -87,23 +90,22 @@ def moved_parameters(
 
 
 def _settled(
-    model: BodyModel, pose: ScenePose, betas: Float[np.ndarray, 'b'], scale: float,
-    outfit: Outfit, rng: np.random.Generator,
+    model: BodyModel, kind: str, parameters: BodyParameters, outfit: Outfit,
+    rng: np.random.Generator,
 ) -> Actor | None:
-    """Return the posed person resting on something, or None when the pose fits no seat."""
-    parameters = BodyParameters(np.zeros(3), pose.tilt, pose.body_pose, betas, scale)
+    """Return the person resting on something, or None when the pose fits no seat."""
     skin = vertices(model, parameters)
-    bed_m = float(rng.uniform(0.35, 0.55)) if pose.kind == 'lying' and rng.random() < 0.6 else 0.0
+    bed_m = float(rng.uniform(0.35, 0.55)) if kind == 'lying' and rng.random() < 0.6 else 0.0
     lift = np.array([-skin[:, 0].mean(), bed_m - skin[:, 1].min() - SINK_M * (bed_m > 0),
                      -skin[:, 2].mean()])
     parameters = parameters.replaced(transl=parameters.transl + lift)
     skin = skin + lift
-    if pose.kind == 'lying' and not _carried(model, skin, bed_m):
+    if kind == 'lying' and not _carried(model, skin, bed_m):
         return None
     seat: list[Block] = []
     if bed_m > 0:
         seat = bed_for(skin.min(axis=0), skin.max(axis=0), bed_m, rng)
-    if pose.kind == 'seated':
+    if kind == 'seated':
         fit = seat_fit(model, skin)
         if fit is None:
             return None
@@ -111,7 +113,7 @@ def _settled(
         seat = makers[rng.integers(3)](fit, rng)
     if seat and max(depth_inside(block, skin).max() for block in seat) > TOLERANCE_M:
         return None
-    return Actor(parameters, skin, dressed(skin, model.f, outfit), outfit, tuple(seat), pose.kind)
+    return Actor(parameters, skin, dressed(skin, model.f, outfit), outfit, tuple(seat), kind)
 
 
 def seat_fit(model: BodyModel, skin: Float[np.ndarray, 'v 3']) -> SeatFit | None:
@@ -126,9 +128,10 @@ def seat_fit(model: BodyModel, skin: Float[np.ndarray, 'v 3']) -> SeatFit | None
     shins = skin[np.isin(bone, _indices(
         'left_knee', 'right_knee', 'left_ankle', 'right_ankle', 'left_foot', 'right_foot'))]
     trunk = skin[np.isin(bone, _indices('pelvis', 'spine1', 'spine2', 'spine3'))]
-    height = float(hips[:, 1].min()) + SINK_M
     front = float(min(shins[:, 2].min(), hips[:, 2].max())) - 0.01
     back = float(trunk[:, 2].min()) - 0.01
+    on_seat = hips[hips[:, 2] < front, 1]
+    height = float(on_seat.min(initial=np.inf)) + SINK_M
     if not (0.25 < height < 0.75 and front - back > 0.28):
         return None
     buttocks = skin[bone == JOINT_INDEX['pelvis']]

@@ -50,6 +50,7 @@ class PersonTruth:
         amodal_mask: Pixels that would, with nothing else there.
         amodal_box_px: Box of the amodal mask (left, top, right, bottom).
         kind: Kind of the pose.
+        clothes_m: Mean distance of cloth and hair from the skin; 0 for the unclothed.
     """
 
     parameters: BodyParameters
@@ -63,6 +64,7 @@ class PersonTruth:
     amodal_mask: Bool[np.ndarray, 'h w']
     amodal_box_px: Float[np.ndarray, '4']
     kind: str
+    clothes_m: float
 
     @property
     def hidden_share(self) -> float:
@@ -204,13 +206,16 @@ def _person(
         joint_state=states,
         shared_state=shared_states(states, nose, alone.depth_m, others, layout.camera),
         mask=mask, amodal_mask=alone.covered, amodal_box_px=_box(alone.covered), kind=actor.kind,
+        clothes_m=float(actor.outfit.displacement_m.mean()),
     )
 
 
 def _acceptable(people: tuple[PersonTruth, ...], config: SceneConfig) -> bool:
     """Return whether every person can be found and the most hidden one is hidden as wanted."""
     enough = all((p.shared_state == JointState.VISIBLE).sum() >= MIN_VISIBLE for p in people)
-    hidden = max((p.hidden_share for p in people), default=config.hidden_share[0])
+    if not people:
+        return True
+    hidden = max(p.hidden_share for p in people)
     return enough and config.hidden_share[0] <= hidden <= config.hidden_share[1]
 
 
