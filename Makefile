@@ -1,0 +1,58 @@
+# Commands for people; .ci/run calls the same ones.
+#
+#   make demo     from nothing to pictures of a fitted, half-hidden person
+#   make test     the whole test suite
+#   make check    ruff and mypy
+#   make docs     write the generated pages of docs/ anew
+#
+# Needs Python 3.10 to 3.13 with venv, and make. Choose another Python with PYTHON=, another place
+# for the environment with VENV=. What is downloaded goes into that environment only.
+
+PYTHON ?= python3
+VENV ?= .venv
+DEMO ?= demo_output
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+SOURCES := $(shell find pop_core pop_ros -type f -not -name '*.pyc') setup.py package.xml
+
+.PHONY: demo test check docs pictures clean
+.DELETE_ON_ERROR:
+
+demo: $(VENV)/.installed
+	cd / && $(abspath $(BIN))/pop demo --out $(abspath $(DEMO))
+
+test: $(VENV)/.tools
+	$(BIN)/python -m pytest
+
+check: $(VENV)/.tools
+	$(BIN)/python -m ruff check .
+	$(BIN)/python -m mypy
+
+docs: $(VENV)/.tools
+	$(BIN)/python -m scripts.write_docs
+
+pictures: $(VENV)/.tools
+	$(BIN)/python -m scripts.write_pictures docs/pictures
+
+clean:
+	rm -rf build dist *.egg-info $(DEMO)
+
+# An existing environment is used as it is and only added to.
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 10) <= sys.version_info < (3, 14))' || \
+	  { echo 'pop needs Python 3.10 to 3.13, found: '"$$($(PYTHON) --version 2>&1)"; \
+	    echo 'Name another one: make PYTHON=python3.12 ...'; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || \
+	  { echo 'pop needs the venv module of Python: sudo apt-get install python3-venv'; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.tools: setup.py constraints.txt | $(BIN)/python
+	@echo 'Installing the libraries into $(VENV) (about 1 GB, once)'
+	$(PIP) install --quiet --constraint constraints.txt setuptools wheel
+	$(PIP) install --quiet --constraint constraints.txt --no-build-isolation '.[test]'
+	touch $@
+
+# Not editable: an editable install leaves out what ROS looks for below share/.
+$(VENV)/.installed: $(VENV)/.tools $(SOURCES)
+	$(PIP) install --quiet --no-deps --no-build-isolation --force-reinstall .
+	touch $@
