@@ -1,0 +1,71 @@
+"""What an ONNX network takes and gives, and the protocol of the decoders that understand it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import numpy as np
+from jaxtyping import Shaped, UInt8
+
+from pop_core.keypoints.detection import Detection
+
+Tensor = Shaped[np.ndarray, '...']
+
+
+@dataclass(frozen=True, slots=True)
+class TensorSpec:
+    """Name, shape and element type of one input or output; unknown sizes are None."""
+
+    name: str
+    shape: tuple[int | None, ...]
+    dtype: str
+
+    def __str__(self) -> str:
+        """Return such as `heatmaps (1, 31, 41, 17) uint8`."""
+        shape = ', '.join('?' if size is None else str(size) for size in self.shape)
+        return f'{self.name} ({shape}) {self.dtype}'
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkSpec:
+    """Inputs and outputs of a network."""
+
+    inputs: tuple[TensorSpec, ...]
+    outputs: tuple[TensorSpec, ...]
+
+    def __str__(self) -> str:
+        """Return inputs -> outputs."""
+        sides = (', '.join(map(str, side)) for side in (self.inputs, self.outputs))
+        return ' -> '.join(sides)
+
+
+class NetworkDecoder(Protocol):
+    """Understands one family of networks: prepares its input, turns its outputs into people."""
+
+    name: ClassVar[str]
+    expects: ClassVar[str]
+
+    def __init__(self, spec: NetworkSpec) -> None:
+        """Keep what is needed of a spec that fits."""
+        ...
+
+    @classmethod
+    def fits(cls, spec: NetworkSpec) -> bool:
+        """Return whether this family's inputs and outputs look like that."""
+        ...
+
+    def detect(
+        self, rgb: UInt8[np.ndarray, 'h w 3'], run: Run
+    ) -> list[Detection]:
+        """Return the people of an image; `run` computes the outputs of one input, in order."""
+        ...
+
+
+class Run(Protocol):
+    """One pass of the network."""
+
+    def __call__(self, tensor: Tensor) -> Sequence[Tensor]:
+        """Return the outputs of one input, in the network's order."""
+        ...
