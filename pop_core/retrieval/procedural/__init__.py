@@ -1,0 +1,1 @@
+"""Poses drawn from rules: what people do with legs, trunk and arms."""

@@ -1,0 +1,207 @@
+"""Occlusion-aware retrieval: K diverse library poses that explain the lifted joints (step 4).
+
+Every pose of the library is placed by the best weighted similarity of Eq. (1) on the joints that
+were lifted; the best are ranked again by what is known of the joints that were not: the ray of a
+pixel, and whether the scene can hide them where the pose puts them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Float32, Int
+
+from pop_core.geometry.camera import Camera
+from pop_core.geometry.rotation import from_rotvec
+from pop_core.keypoints.lifted_joints import LiftedJoints
+from pop_core.retrieval.candidate import PoseCandidate
+from pop_core.retrieval.pose_library import PoseLibrary, visibility_mask
+from pop_core.retrieval.procrustes import (
+    best_indices,
+    rank_similarities,
+    solve_similarities,
+)
+from pop_core.settings import setting
+
+Hides = Callable[[Float[np.ndarray, 'n 3']], Float[np.ndarray, 'n']]
+MIN_JOINTS = 3  # fewer points leave a turn about their line undecided
+
+
+@dataclass(frozen=True, slots=True)
+class RetrievalConfig:
+    """Settings of retrieval."""
+
+    candidates: int = setting(
+        6, minimum=1, maximum=64, about='Poses to return: the hypotheses of the fit.')
+    shortlist: int = setting(
+        256, minimum=1, maximum=4096, about='Best poses by Eq. (1) that are ranked again.')
+    pose_sigma_m: float = setting(
+        0.04, unit='m', minimum=0.001, maximum=0.5,
+        about='How far joints of the right pose may lie off: proportions and library spacing.')
+    ray_sigma_m: float = setting(
+        0.08, unit='m', minimum=0.005, maximum=1.0,
+        about='Tolerated distance of a hidden joint from the ray of its pixel.')
+    hide_sigma_m: float = setting(
+        0.10, unit='m', minimum=0.005, maximum=1.0,
+        about='Tolerated distance of a hidden joint in front of the measured surface.')
+    diversity_m: float = setting(
+        0.12, unit='m', minimum=0.0, maximum=1.0,
+        about='Mean distance of hidden joints between two returned poses, relaxed if need be.')
+    smallest_scale: float = setting(
+        0.5, minimum=0.2, maximum=1.0, about='Smallest person, in sizes of the library body.')
+    largest_scale: float = setting(
+        1.25, minimum=1.0, maximum=2.0, about='Largest person, in sizes of the library body.')
+    same_visibility: bool = setting(
+        False, about='Only poses recorded with the same visible joints, as in the paper.')
+    threads: int = setting(2, minimum=1, maximum=64, about='Threads of the search.')
+
+
+def retrieve(
+    library: PoseLibrary,
+    lifted: LiftedJoints,
+    config: RetrievalConfig | None = None,
+    *,
+    hides: Hides | None = None,
+    gravity: Float[np.ndarray, '3'] | None = None,
+    camera: Camera | None = None,
+) -> list[PoseCandidate]:
+    """Return K diverse poses placed in the scene, best first (Eq. 1).
+
+    Args:
+        library: Poses to search, all of them.
+        lifted: What was measured; joints without a position count as hidden.
+        config: Settings.
+        hides: How far [m] points of the camera frame stand in the open, in front of the measured
+            surface; 0 where the scene can hide them. None: nothing is known.
+        gravity: Direction of gravity in the camera frame; rotations are then restricted to turns
+            about it. None: any rotation.
+        camera: Gives the rays of hidden joints that have a pixel. None: rays are not used.
+
+    Returns:
+        At most `config.candidates` poses, none when fewer than three joints were lifted.
+    """
+    config = config or RetrievalConfig()
+    seen = lifted.lifted
+    if int(seen.sum()) < MIN_JOINTS:
+        return []
+    weight = np.zeros(len(seen))
+    weight[seen] = 1.0 / (lifted.sigma_m[seen] ** 2 + config.pose_sigma_m**2)
+    R_camera_up = _upright_frame(gravity)
+    yaw_only = gravity is not None
+    shortlist = _shortlist(library, lifted, weight, config, R_camera_up, yaw_only=yaw_only)
+    joints = np.asarray(library.joints[shortlist], dtype=np.float64)
+    placed = solve_similarities(
+        joints[:, seen], lifted.positions_camera[seen] @ R_camera_up, weight[seen],
+        (config.smallest_scale, config.largest_scale), yaw_only=yaw_only)
+    joints_camera = placed.apply(joints) @ R_camera_up.T
+    energy = placed.residual_m**2 * weight.sum() - 2.0 * np.log(library.weights[shortlist])
+    energy += hidden_energy(joints_camera, lifted, config, hides, camera)
+    chosen = choose_diverse(joints_camera, energy, ~seen, config)
+    belief = np.exp(-0.5 * (energy[chosen] - energy[chosen].min()))
+    belief /= belief.sum()
+    return [
+        PoseCandidate(
+            body_pose=np.asarray(library.body_pose[pose], dtype=np.float64),
+            joints_camera=joints_camera[i],
+            scale=float(placed.scale[i]),
+            R_camera_body=R_camera_up @ placed.R[i] @ from_rotvec(
+                np.asarray(library.tilt[pose], dtype=np.float64)),
+            t_camera_body=R_camera_up @ placed.t[i],
+            residual_m=float(placed.residual_m[i]),
+            weight=float(share),
+            index=int(pose),
+        )
+        for i, pose, share in zip(chosen, shortlist[chosen], belief, strict=True)
+    ]
+
+
+def hidden_energy(
+    joints_camera: Float[np.ndarray, 'n s 3'],
+    lifted: LiftedJoints,
+    config: RetrievalConfig,
+    hides: Hides | None,
+    camera: Camera | None,
+) -> Float[np.ndarray, 'n']:
+    """Return what it costs each pose to have its unmeasured joints where they are.
+
+    Both terms saturate (Geman and McClure 1987): a pixel may be wrong, and a library pose need
+    not be hidden to the last centimetre.
+    """
+    hidden = ~lifted.lifted
+    energy = np.zeros(len(joints_camera))
+    if hides is not None and hidden.any():
+        points = joints_camera[:, hidden]
+        gap_m = hides(points.reshape(-1, 3)).reshape(points.shape[:2])
+        energy += _saturated((gap_m / config.hide_sigma_m) ** 2).sum(axis=1)
+    on_ray = hidden & np.isfinite(lifted.keypoints_px).all(axis=1)
+    if camera is not None and on_ray.any():
+        rays = camera.unproject(lifted.keypoints_px[on_ray], np.ones(int(on_ray.sum())))
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+        off_m = np.linalg.norm(np.cross(joints_camera[:, on_ray], rays), axis=2)
+        trust = lifted.scores[on_ray]
+        energy += (trust * _saturated((off_m / config.ray_sigma_m) ** 2)).sum(axis=1)
+    return energy
+
+
+def choose_diverse(
+    joints: Float[np.ndarray, 'n s 3'],
+    energy: Float[np.ndarray, 'n'],
+    hidden: np.ndarray,
+    config: RetrievalConfig,
+) -> Int[np.ndarray, 'k']:
+    """Return up to K indices, best first, each away from all better ones at the hidden joints.
+
+    Where everything is seen, all joints count. The distance is halved until enough are found.
+    """
+    order = np.argsort(energy, kind='stable')
+    points = joints[:, hidden] if hidden.any() else joints
+    wanted = min(config.candidates, len(order))
+    apart_m = config.diversity_m
+    while True:
+        chosen: list[int] = []
+        for i in order:
+            gap = np.linalg.norm(points[chosen] - points[i], axis=2).mean(axis=1)
+            if len(chosen) == 0 or gap.min() >= apart_m:
+                chosen.append(int(i))
+            if len(chosen) == wanted:
+                return np.array(chosen)
+        apart_m = 0.5 * apart_m if apart_m > 1e-3 else 0.0
+
+
+def _shortlist(
+    library: PoseLibrary,
+    lifted: LiftedJoints,
+    weight: Float[np.ndarray, 's'],
+    config: RetrievalConfig,
+    R_camera_up: Float[np.ndarray, '3 3'],
+    *,
+    yaw_only: bool,
+) -> Int[np.ndarray, 'k']:
+    """Return the best poses by Eq. (1), best first."""
+    costs: Float32[np.ndarray, 'm'] = rank_similarities(
+        library.columns, lifted.positions_camera @ R_camera_up, weight,
+        (config.smallest_scale, config.largest_scale),
+        yaw_only=yaw_only, threads=config.threads)
+    if config.same_visibility:
+        same = library.masks == visibility_mask(lifted.lifted)
+        if same.any():
+            costs[~same] = np.inf
+    best = best_indices(costs, config.shortlist)
+    return best[np.isfinite(costs[best])]
+
+
+def _upright_frame(gravity: Float[np.ndarray, '3'] | None) -> Float[np.ndarray, '3 3']:
+    """Return the rotation whose second column is up in the camera frame; eye if unknown."""
+    if gravity is None:
+        return np.eye(3)
+    up = -gravity / np.linalg.norm(gravity)
+    side = np.cross(up, [0.0, 0.0, 1.0] if abs(up[2]) < 0.9 else [0.0, 1.0, 0.0])
+    side /= np.linalg.norm(side)
+    return np.column_stack([side, up, np.cross(side, up)])
+
+
+def _saturated(squared: np.ndarray, limit: float = 9.0) -> np.ndarray:
+    """Return Geman-McClure of squared normalised distances: linear at zero, `limit` at most."""
+    return squared / (1.0 + squared / limit)
