@@ -9,10 +9,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
 from pop_core.body.joints import PARENTS
-from pop_core.estimate import BodyEstimate, JointState
+from pop_core.estimate import JointState
 from pop_core.geometry.camera import Camera
 from pop_core.rendering.palette import INK, PAPER, person_color
 from pop_core.rendering.shading import shade
+from pop_core.rendering.shown_body import ShownBody
 
 OPACITY = 0.72
 SHIFT = 4  # fractional bits of cv2's coordinates: joints are drawn where they are
@@ -21,7 +22,7 @@ AROUND_JOINT_M = 0.024
 
 def draw_people(
     rgb: UInt8[np.ndarray, 'h w 3'],
-    bodies: Sequence[BodyEstimate],
+    bodies: Sequence[ShownBody],
     f: Int[np.ndarray, 'm 3'],
     camera: Camera,
 ) -> UInt8[np.ndarray, 'h w 3']:

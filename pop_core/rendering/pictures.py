@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from pop_core.estimate import BodyEstimate, FrameResult
+from pop_core.estimate import FrameResult
 from pop_core.geometry.camera import Camera
 from pop_core.rendering.overlay import draw_people
 from pop_core.rendering.palette import PAPER
 from pop_core.rendering.scene_view import FROM_ABOVE, FROM_THE_RIGHT, draw_scene, fitting_view
+from pop_core.rendering.shown_body import ShownBody, shown
 from pop_core.rendering.text import captioned, colored_depth
 from pop_core.rgbd import RgbdFrame, point_cloud, undistort_frame
 
@@ -22,14 +23,21 @@ GAP_PX = 6
 def result_picture(
     frame: RgbdFrame, result: FrameResult, f: Int[np.ndarray, 'm 3']
 ) -> UInt8[np.ndarray, 'h w 3']:
-    """Return the four panels colour, depth, overlay, side and top view, two by two."""
-    colour, depth, overlay, views = result_panels(frame, result.bodies, f)
+    """Return the picture of a result of the pipeline."""
+    return four_panels(frame, [shown(body) for body in result.bodies], f)
+
+
+def four_panels(
+    frame: RgbdFrame, bodies: Sequence[ShownBody], f: Int[np.ndarray, 'm 3']
+) -> UInt8[np.ndarray, 'h w 3']:
+    """Return colour, depth, overlay, and side and top view, two by two."""
+    colour, depth, overlay, views = result_panels(frame, bodies, f)
     rows = [_beside(colour, depth), _beside(overlay, views)]
     return np.concatenate([rows[0], _gap(GAP_PX, rows[0].shape[1]), rows[1]])
 
 
 def result_panels(
-    frame: RgbdFrame, bodies: Sequence[BodyEstimate], f: Int[np.ndarray, 'm 3']
+    frame: RgbdFrame, bodies: Sequence[ShownBody], f: Int[np.ndarray, 'm 3']
 ) -> list[UInt8[np.ndarray, 'h w 3']]:
     """Return the captioned panels colour, depth, overlay and views, all of the frame's size.
 
@@ -48,7 +56,7 @@ def result_panels(
 
 
 def _views(
-    frame: RgbdFrame, bodies: Sequence[BodyEstimate], f: Int[np.ndarray, 'm 3']
+    frame: RgbdFrame, bodies: Sequence[ShownBody], f: Int[np.ndarray, 'm 3']
 ) -> UInt8[np.ndarray, 'h w 3']:
     """Return the side view beside the top view, in one panel of the frame's size."""
     shown = _points_to_show(frame, bodies)
@@ -62,7 +70,7 @@ def _views(
 
 
 def _points_to_show(
-    frame: RgbdFrame, bodies: Sequence[BodyEstimate]
+    frame: RgbdFrame, bodies: Sequence[ShownBody]
 ) -> Float[np.ndarray, 'n 3']:
     """Return what the views must contain [m]: the people, or the whole cloud without any."""
     if bodies:

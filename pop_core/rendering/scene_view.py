@@ -13,10 +13,10 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from pop_core.estimate import BodyEstimate
 from pop_core.geometry.camera import Camera
 from pop_core.rendering.palette import FAINT, INK, PAPER, person_color
 from pop_core.rendering.shading import shade
+from pop_core.rendering.shown_body import ShownBody
 from pop_core.rgbd import RgbdFrame, point_cloud
 
 # Rows are the view's axes in the camera frame.
@@ -63,7 +63,7 @@ def fitting_view(
 
 
 def draw_scene(
-    frame: RgbdFrame, bodies: Sequence[BodyEstimate], f: Int[np.ndarray, 'm 3'], view: SceneView
+    frame: RgbdFrame, bodies: Sequence[ShownBody], f: Int[np.ndarray, 'm 3'], view: SceneView
 ) -> UInt8[np.ndarray, 'h w 3']:
     """Return the picture of a view: the scene's points, meshes over them, people's points on top.
 
@@ -95,7 +95,7 @@ def _draw_points(
     frame: RgbdFrame,
     mask: Bool[np.ndarray, 'h w'],
     view: SceneView,
-    bodies: Sequence[BodyEstimate],
+    bodies: Sequence[ShownBody],
 ) -> None:
     """Draw measured points in their own, paled colours, the nearest to the viewer last."""
     points, uv = point_cloud(frame, mask)
