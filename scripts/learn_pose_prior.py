@@ -2,8 +2,9 @@
 
     python scripts/learn_pose_prior.py --mocap ../shared/data/mocap/cmu_smpl_train.npz
 
-Subjects are balanced, every pose is joined by its mirror image, and the number of components is
-judged on subjects held out whole: frames of one subject leak.
+Half of the components come from the motion, half from the procedural families: the motion shows
+nobody who sits, kneels or lies. Subjects are balanced, every pose is joined by its mirror image,
+and the number of components is judged on subjects held out whole: frames of one subject leak.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
+from pop_core.body.default_body import default_body
 from pop_core.body.joint_limits import LOWER, UPPER, mirrored_pose, pose_coordinates
 from pop_core.body.joints import JOINT_NAMES
 from pop_core.retrieval.canonical_pose import canonical_pose, hinge_elbows
 from pop_core.retrieval.pose_prior import DEFAULT_FILE, PosePrior
+from pop_core.retrieval.procedural.families import FAMILIES, draw_batch
 
 RANK = 12
 LARGEST_SUBJECT = 1500  # frames that one subject may count for
@@ -91,10 +94,29 @@ def learn(c: np.ndarray, weight: np.ndarray, k: int, seed: int = 0) -> PosePrior
         parts = [fit_component(c, responsibility[:, i]) for i in range(k)]
         prior = PosePrior(
             responsibility.sum(axis=0) / responsibility.sum(),
-            *(np.stack(arrays) for arrays in zip(*parts, strict=True)))
+            *(np.stack(arrays) for arrays in zip(*parts, strict=True)), np.ones(k, dtype=bool))
         cost = prior.component_costs(c)
         share = np.exp(-cost - np.logaddexp.reduce(-cost, axis=1)[:, None])
     return prior
+
+
+def procedural_coordinates(batches: int = 120) -> np.ndarray:
+    """Return coordinates (n, 69) [rad] of poses that the rules draw, all families alike."""
+    rng, model = np.random.default_rng(1), default_body()
+    families = list(FAMILIES.values())
+    drawn = [draw_batch(families[i % len(families)], model, rng, 128) for i in range(batches)]
+    pose = np.concatenate([poses.body_pose for poses in drawn])
+    return pose_coordinates(pose).reshape(len(pose), -1)
+
+
+def joined(motion: PosePrior, rules: PosePrior) -> PosePrior:
+    """Return one mixture of both, each counting for half."""
+    pairs = [
+        np.concatenate([getattr(motion, name), getattr(rules, name)])
+        for name in ('weights', 'means', 'factors', 'variances')
+    ]
+    from_motion = np.arange(len(pairs[0])) < len(motion.weights)
+    return PosePrior(0.5 * pairs[0], *pairs[1:], from_motion)
 
 
 def mean_log_density(prior: PosePrior, c: np.ndarray, weight: np.ndarray) -> float:
@@ -108,7 +130,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--mocap', type=Path, required=True)
     parser.add_argument('--out', type=Path, default=DEFAULT_FILE)
-    parser.add_argument('--components', type=int, default=6)
+    parser.add_argument('--components', type=int, default=4)
     parser.add_argument('--every', type=int, default=2, help='use every n-th frame')
     options = parser.parse_args()
     c, subjects = load_coordinates(options.mocap)
@@ -123,12 +145,15 @@ def main() -> None:
         score = mean_log_density(prior, test, both([subject_weights(subjects[held])] * 2))
         print(f'{k} components: log density {mean_log_density(prior, train, weight):7.2f} '
               f'on its subjects, {score:7.2f} on subjects {", ".join(HELD_OUT)}')
-    prior = learn(with_mirror(c), both([subject_weights(subjects)] * 2), options.components)
+    motion = learn(with_mirror(c), both([subject_weights(subjects)] * 2), options.components)
+    rules = with_mirror(procedural_coordinates())
+    prior = joined(motion, learn(rules, np.ones(len(rules)), options.components))
     inside = (prior.means >= LOWER.reshape(-1)) & (prior.means <= UPPER.reshape(-1))
     print(f'means within limits: {inside.all()}; shares {np.round(prior.weights, 3)}')
     np.savez_compressed(
         options.out, weights=prior.weights, means=prior.means.astype(np.float32),
-        factors=prior.factors.astype(np.float32), variances=prior.variances.astype(np.float32))
+        factors=prior.factors.astype(np.float32), variances=prior.variances.astype(np.float32),
+        from_motion=prior.from_motion)
     print(f'{options.out}: {options.out.stat().st_size / 1000:.0f} kB')
 
 

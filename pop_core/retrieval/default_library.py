@@ -70,7 +70,7 @@ def generate_library(
         procedural: False takes poses from the learned prior alone.
     """
     rng = np.random.default_rng(seed)
-    drawn = draw_poses(model, load_pose_prior(), rng, procedural=procedural)
+    drawn = draw_poses(model, load_pose_prior().motion_part(), rng, procedural=procedural)
     first = [next(drawn) for _ in range(SAMPLE_BATCHES)]
     thinner = PoseThinner(np.concatenate([_joints(b, model) for b in first]), spacing_m, size)
     poses: list[np.ndarray] = []
@@ -93,7 +93,7 @@ def cache_folder() -> Path:
 
 def fingerprint(model: BodyModel) -> str:
     """Return a short text that changes with everything the default library is made from."""
-    prior = load_pose_prior()
+    prior = load_pose_prior().motion_part()
     parts = (
         model.joint_template.round(5), model.v_template[model.nose_vertex].round(5),
         prior.means.round(5), prior.weights.round(5),

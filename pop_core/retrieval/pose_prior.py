@@ -1,7 +1,9 @@
 """Pose prior: a mixture of low-rank Gaussians over swing-twist coordinates of the 23 joints [rad].
 
 Each component has covariance W W^T + diag(v): a few directions in which people move, and a floor
-of variance for what the data never showed. Learned by `scripts/learn_pose_prior.py`.
+of variance for what the data never showed. Some components are learned from captured motion, the
+others from the rules of `procedural`: the motion at hand shows nobody who sits, kneels or lies,
+and a fit must not pull such people upright. Learned by `scripts/learn_pose_prior.py`.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from pop_core.body.joint_limits import TWIST_AXES, pose_coordinates
 from pop_core.errors import LibraryFileError
@@ -30,6 +32,7 @@ class PosePrior:
         means: Mean coordinates [rad].
         factors: W of each component [rad].
         variances: Diagonal floor v of each component [rad^2].
+        from_motion: Whether each component was learned from captured motion.
 
     Raises:
         LibraryFileError: If shapes do not fit together or a variance is not positive.
@@ -39,6 +42,7 @@ class PosePrior:
     means: Float[np.ndarray, 'k x']
     factors: Float[np.ndarray, 'k x r']
     variances: Float[np.ndarray, 'k x']
+    from_motion: Bool[np.ndarray, 'k']
     # Derived once: L^-1 of each covariance L L^T, and -log of each component's peak density.
     whiteners: Float[np.ndarray, 'k x x'] = field(init=False)
     peak_costs: Float[np.ndarray, 'k'] = field(init=False)
@@ -58,6 +62,14 @@ class PosePrior:
         normaliser = 0.5 * N_COORDINATES * np.log(2.0 * np.pi)
         object.__setattr__(self, 'whiteners', np.linalg.inv(lower))
         object.__setattr__(self, 'peak_costs', half_log_det + normaliser - np.log(self.weights))
+
+    def motion_part(self) -> PosePrior:
+        """Return the mixture of the components learned from captured motion alone."""
+        part = self.from_motion
+        weights = self.weights[part] / self.weights[part].sum()
+        return PosePrior(
+            weights, self.means[part], self.factors[part], self.variances[part],
+            np.ones(len(weights), dtype=bool))
 
     def component_costs(self, c: Float[np.ndarray, 'n x']) -> Float[np.ndarray, 'n k']:
         """Return -log(weight * density) of each component at coordinates c [rad]."""
@@ -117,8 +129,10 @@ def load_pose_prior(path: Path = DEFAULT_FILE) -> PosePrior:
                 data[name].astype(np.float64)
                 for name in ('weights', 'means', 'factors', 'variances')
             ]
+            from_motion = data['from_motion']
     except (OSError, KeyError, ValueError) as error:
         raise LibraryFileError(
-            f'{path}: expected an npz with weights, means, factors and variances, found {error}'
+            f'{path}: expected an npz with weights, means, factors, variances and '
+            f'from_motion, found {error}'
         ) from error
-    return PosePrior(*arrays)
+    return PosePrior(*arrays, from_motion)

@@ -59,10 +59,12 @@ def test_sampling_is_decided_by_its_seed():
 
 def test_knees_that_bend_forward_are_less_likely_than_knees_that_bend_back():
     prior = load_pose_prior()
-    pose = prior.sample(np.random.default_rng(5), 1)
-    forward, back = pose.copy(), pose.copy()
-    forward[0, 3, 0], back[0, 3, 0] = -1.0, 1.0
-    assert prior.log_density(back)[0] > prior.log_density(forward)[0] + 20
+    forward = prior.sample(np.random.default_rng(5), 50)
+    back = forward.copy()
+    forward[:, 3, 0], back[:, 3, 0] = -1.0, 1.0
+    gain = prior.log_density(back) - prior.log_density(forward)
+    assert gain.min() > 3
+    assert np.median(gain) > 20
 
 
 def test_poses_and_their_mirror_images_are_alike_likely():
@@ -82,4 +84,12 @@ def test_a_file_that_is_no_prior_is_named(tmp_path):
 
 def test_wrong_shapes_are_refused():
     with pytest.raises(LibraryFileError, match='69 coordinates'):
-        PosePrior(np.ones(1), np.zeros((1, 68)), np.zeros((1, 68, 2)), np.ones((1, 68)))
+        PosePrior(np.ones(1), np.zeros((1, 68)), np.zeros((1, 68, 2)), np.ones((1, 68)),
+                  np.ones(1, dtype=bool))
+
+
+def test_the_motion_part_is_a_mixture_of_its_own():
+    prior = load_pose_prior()
+    part = prior.motion_part()
+    assert 0 < len(part.weights) < len(prior.weights)
+    assert np.isclose(part.weights.sum(), 1.0)
