@@ -37,6 +37,11 @@ class SeatFit:
 def table(rng: np.random.Generator) -> list[Block]:
     """Return a table, often with things on it."""
     w, d, h = rng.uniform(0.9, 1.8), rng.uniform(0.55, 0.9), rng.uniform(0.68, 0.82)
+    return bare_table(w, d, h, rng) + _things_on_top(w, d, h, rng)
+
+
+def bare_table(w: float, d: float, h: float, rng: np.random.Generator) -> list[Block]:
+    """Return a table of width, depth and height [m], some with a panel before the legs."""
     colour, top = wood_colour(rng), rng.uniform(0.025, 0.05)
     parts = [box([w, top, d], [0, h - top, 0], colour, Texture.WOOD)]
     for x in (-1, 1):
@@ -46,7 +51,7 @@ def table(rng: np.random.Generator) -> list[Block]:
     if rng.random() < 0.4:
         panel = rng.uniform(0.3, 0.6)
         parts.append(box([w - 0.16, panel, 0.02], [0, h - top - panel, d / 2 - 0.1], colour * 0.9))
-    return parts + _things_on_top(w, d, h, rng)
+    return parts
 
 
 def crate(rng: np.random.Generator) -> list[Block]:

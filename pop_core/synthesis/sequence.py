@@ -14,7 +14,7 @@ from pop_core.synthesis.blocks import Block, moved
 from pop_core.synthesis.cameras import CameraRange, draw_camera
 from pop_core.synthesis.clothes import Outfit, draw_outfit, dressed
 from pop_core.synthesis.layouts import Layout
-from pop_core.synthesis.occluders import table
+from pop_core.synthesis.occluders import bare_table
 from pop_core.synthesis.people import Actor, actor_at
 from pop_core.synthesis.poses import walking_pose
 from pop_core.synthesis.rooms import draw_clutter, draw_room
@@ -66,7 +66,8 @@ def _draw_stage(
     """Return the room without the person, and what the person looks like."""
     room = replace(draw_room(rng), half_width_m=3.2, back_m=1.6)
     camera, T_camera_room = draw_camera(np.array([0.0, 0.95, 0.0]), CAMERA, rng)
-    desk: tuple[Block, ...] = moved(table(rng), np.array([0.0, 0.0, 0.75]), 0.0)
+    desk: tuple[Block, ...] = moved(
+        bare_table(1.5, 0.7, 0.74, rng), np.array([0.0, 0.0, 0.75]), 0.0)
     lamp = np.array([-1.0, room.height_m - 0.2, 1.8])
     blocks = desk + draw_clutter(room, rng, 3)
     betas = np.clip(rng.normal(size=model.n_betas), -1.2, 1.2)

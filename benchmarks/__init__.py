@@ -1,0 +1,1 @@
+"""Accuracy and speed, measured the same way every time."""
