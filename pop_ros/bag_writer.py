@@ -10,11 +10,16 @@ from typing import Any
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from pop_ros.bag_reader import STORE, BagError
+from pop_ros.pop_messages import definition_files
 
 ROS1_STORE = get_typestore(Stores.ROS1_NOETIC)
+for file in definition_files():
+    definition = get_types_from_msg(file.read_text(encoding='utf-8'), f'pop_msgs/msg/{file.stem}')
+    STORE.register(definition)
+    ROS1_STORE.register(definition)
 # Types whose layout ROS 2 has extended; they are rewritten field by field.
 EXTENDED_IN_ROS2 = {'visualization_msgs/msg/Marker'}
 

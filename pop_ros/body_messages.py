@@ -13,13 +13,15 @@ from visualization_msgs.msg import Marker
 from pop_core.body.model import BodyModel
 from pop_core.estimate import BodyEstimate, FrameResult
 from pop_core.rgbd import RgbdFrame
-from pop_ros import to_messages
+from pop_ros import pop_messages, to_messages
 from pop_ros.cdr import MarkerTemplate
 from pop_ros.node_config import MeshConfig
 from pop_ros.person_ids import PersonIds
 
-MESH, JOINTS, CLOUD = 'mesh', 'joints', 'cloud'
+MESH, JOINTS, CLOUD, BODIES = 'mesh', 'joints', 'cloud', 'bodies'
 OUTPUT_TYPES = {MESH: Marker, JOINTS: PoseArray, CLOUD: PointCloud2}
+if pop_messages.pop_msgs is not None:
+    OUTPUT_TYPES[BODIES] = pop_messages.pop_msgs.BodyArray
 MAX_TEMPLATES = 64  # ids never return; templates of people who left are of no use
 
 # A topic's name without the node's, and a message or its serialised bytes.
@@ -60,6 +62,7 @@ class BodyMessages:
             MESH: lambda: self._meshes(result, ids, gone, frame.stamp_ns, frame_id),
             JOINTS: lambda: [to_messages.joints_message(bodies, header)],
             CLOUD: lambda: [to_messages.cloud_message(frame, bodies, ids, header)],
+            BODIES: lambda: [pop_messages.bodies_message(bodies, ids, header)],
         }
         return [(name, m) for name, make in makers.items() if name in wanted for m in make()]
 

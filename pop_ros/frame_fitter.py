@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
+from pop_core.body.model import BodyModel
 from pop_core.config import PipelineConfig
 from pop_core.estimate import FrameResult
 from pop_core.pipeline import BodyPipeline
@@ -50,6 +51,11 @@ class FrameFitter:
             arguments.keypoints, arguments.keypoints_dir, arguments.decoder)
         self._pipeline = make_pipeline(detector, pipeline_config, progress=progress)
         self._messages = BodyMessages(self._pipeline.model, mesh)
+
+    @property
+    def model(self) -> BodyModel:
+        """Return the body model that is fitted."""
+        return self._pipeline.model
 
     def configure(self, pipeline_config: PipelineConfig, mesh: MeshConfig) -> None:
         """Take over changed settings; model, library and keypoint source stay loaded."""

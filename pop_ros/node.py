@@ -24,6 +24,7 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
+from pop_core.body.model import BodyModel
 from pop_core.config import PipelineConfig
 from pop_core.errors import PopError
 from pop_ros.body_messages import OUTPUT_TYPES
@@ -35,6 +36,7 @@ from pop_ros.inputs import RgbdInputs, RgbdMessages
 from pop_ros.node_arguments import SourceArguments, parse_arguments
 from pop_ros.node_config import NodeConfig
 from pop_ros.parameters import ConfigParameters
+from pop_ros.pop_messages import model_message, pop_msgs
 from pop_ros.qos import output_qos
 from pop_ros.statistics import NodeStatistics, Snapshot
 from pop_ros.to_messages import make_header
@@ -146,7 +148,18 @@ class PopNode(Node):
             self._arguments, self._settings.pipeline_config, self._config.mesh,
             self._say_progress)
         self._fitter = fitter
+        self._publish_model(fitter.model)
         self.log.info(f'ready after {time.monotonic() - started_s:.1f} s')
+
+    def _publish_model(self, model: BodyModel) -> None:
+        """Latch what a receiver of ~/bodies needs to know, where pop_msgs is installed."""
+        if pop_msgs is None:
+            self.log.info('pop_msgs is not installed: no ~/bodies and no ~/body_model')
+            return
+        header = make_header(self.get_clock().now().nanoseconds, '')
+        publisher = self.create_publisher(
+            pop_msgs.BodyModel, '~/body_model', output_qos(latched=True))
+        publisher.publish(model_message(model, header))
 
     def _say_progress(self, share: float, sentence: str) -> None:
         if share >= self._said_share + PROGRESS_STEP:

@@ -71,9 +71,10 @@ class NodeProcess:
 class DdsPlayer:
     """Publishes a bag's images and records the node's outputs."""
 
-    def __init__(self, writer: BagWriter, check: Callable[[], None]) -> None:
+    def __init__(self, check: Callable[[], None]) -> None:
         """Join the ROS graph; `check` raises when there is no point in going on."""
-        self._writer, self._check = writer, check
+        self._check = check
+        self._writer: BagWriter | None = None
         self._values: dict[str, str] = {}
         self._context = Context()
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
@@ -87,7 +88,6 @@ class DdsPlayer:
             self._node.create_subscription(
                 kind, f'{OUTPUT_NAMESPACE}/{name}', self._recorder(name), output_qos(), raw=True)
         self._node.create_subscription(DiagnosticArray, '/diagnostics', self._on_report, 10)
-        announce_outputs(writer)
 
     def __enter__(self) -> DdsPlayer:
         """Return the player."""
@@ -102,7 +102,7 @@ class DdsPlayer:
         self._node.destroy_node()  # type: ignore[no-untyped-call]
         rclpy.shutdown(context=self._context)
 
-    def wait_until_subscribed(self, timeout_s: float = READY_S) -> None:
+    def wait_until_subscribed(self, timeout_s: float) -> None:
         """Wait until the node has subscribed all inputs, which it does once it is ready.
 
         Raises:
@@ -115,6 +115,11 @@ class DdsPlayer:
             raise ReplayError(
                 f'replay: expected a node that subscribes {", ".join(self._publishers)} within '
                 f'{timeout_s:.0f} s, found none: is it running in this ROS_DOMAIN_ID?')
+
+    def record_into(self, writer: BagWriter) -> None:
+        """Write every output from now on into an open bag."""
+        announce_outputs(writer)
+        self._writer = writer
 
     def play(
         self, bag: BagReader, topics: RgbdTopics, rate: float, on_message: Callable[[], None]
@@ -172,6 +177,8 @@ class DdsPlayer:
             # Every output starts with a header, and that with its stamp.
             sec, nanosec = struct.unpack_from('<iI', data, 4)
             time_ns = sec * 1_000_000_000 + nanosec
+            if self._writer is None:
+                return
             self._writer.write(f'{OUTPUT_NAMESPACE}/{name}', KINDS[name], time_ns, bytes(data))
         return record
 

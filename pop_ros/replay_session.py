@@ -17,7 +17,7 @@ from pop_ros.frame_fitter import FrameFitter
 from pop_ros.node_arguments import SourceArguments
 from pop_ros.node_config import MeshConfig
 from pop_ros.replay import ReplaySummary, replay_every_frame
-from pop_ros.replay_dds import DdsPlayer, NodeProcess
+from pop_ros.replay_dds import READY_S, DdsPlayer, NodeProcess
 
 RUNNING_NODE_S = 30.0
 
@@ -76,8 +76,9 @@ def run_replay(request: ReplayRequest, say: Callable[[str], None]) -> ReplaySumm
 def _every_frame(
     request: ReplayRequest, bag: BagReader, topics: RgbdTopics, on_message: Callable[[], None]
 ) -> ReplaySummary:
+    writer = BagWriter(request.out, request.ros1)
     fitter = FrameFitter(request.sources, PipelineConfig(), MeshConfig())
-    with BagWriter(request.out, request.ros1) as writer:
+    with writer:
         return replay_every_frame(
             bag, topics, fitter, writer, slop_s=request.slop_s, on_message=on_message)
 
@@ -86,13 +87,17 @@ def _over_dds(
     request: ReplayRequest, bag: BagReader, topics: RgbdTopics, on_message: Callable[[], None]
 ) -> ReplaySummary:
     summary = ReplaySummary()
+    writer = BagWriter(request.out, request.ros1)
     node = None if request.node_running else NodeProcess(request.sources, request.slop_s)
     check = (lambda: None) if node is None else node.check
     try:
-        with BagWriter(request.out, request.ros1) as writer, DdsPlayer(writer, check) as player:
-            player.wait_until_subscribed(*([RUNNING_NODE_S] if node is None else []))
-            summary.messages = player.play(bag, topics, request.rate, on_message)
-            player.finish(summary)
+        with DdsPlayer(check) as player:
+            player.wait_until_subscribed(RUNNING_NODE_S if node is None else READY_S)
+            # Nothing is left behind on the disk when the node does not come up.
+            with writer:
+                player.record_into(writer)
+                summary.messages = player.play(bag, topics, request.rate, on_message)
+                player.finish(summary)
     finally:
         code = 0 if node is None else node.stop()
     if code:
