@@ -107,9 +107,11 @@ def _draw_points(
     order = np.argsort(-along[keep], kind='stable')
     columns, rows = uv[keep][order].astype(int).T
     color = frame.rgb[rows, columns].astype(np.float32)
+    pale = np.rint(0.55 * color + 0.45 * np.array(PAPER)).astype(np.uint8)
     v, u = _pixels(points[keep][order], view, clip=False)
-    inside = (u >= 0) & (v >= 0) & (u < view.camera.width) & (v < view.camera.height)
-    picture[v[inside], u[inside]] = (0.55 * color + 0.45 * np.array(PAPER))[inside]
+    for dv, du in ((0, 0), (0, 1), (1, 0), (1, 1)):  # two by two pixels: single ones hardly show
+        inside = (u >= 0) & (v >= 0) & (u + du < view.camera.width) & (v + dv < view.camera.height)
+        picture[v[inside] + dv, u[inside] + du] = pale[inside]
 
 
 def _pixels(

@@ -1,0 +1,77 @@
+"""The page the demo ends with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pop_core import __version__
+from pop_ros.demo import DemoFrame, DemoPaths
+from pop_ros.replay import ReplaySummary
+from pop_ros.report import Report
+
+LEAD = (
+    'A synthetic person walks behind a table. A ROS 2 node in its own process received the '
+    'recording over DDS and published a mesh, joints and points for every frame; what you see '
+    'was read back from the bag of its outputs.')
+LEGEND = (
+    'Left to right, top to bottom: colour, depth, the fitted mesh with its skeleton (hollow '
+    'joints are hidden from the camera; the outline is what was segmented), and the scene from '
+    'the right and from above with the measured points of the person in black.')
+
+
+def write_demo_report(
+    paths: DemoPaths, frames: Sequence[DemoFrame], summary: ReplaySummary
+) -> None:
+    """Write the report of a demo."""
+    report = Report('pop: a body, hidden limbs included', LEAD)
+    report.film([frame.picture for frame in frames], [_caption(frame) for frame in frames])
+    report.text(LEGEND)
+    report.heading('Distance of joints from the truth')
+    report.table(('joints', 'count', 'mean', 'median', '90 %'), error_rows(frames))
+    report.text(
+        'One short sequence whose keypoints are the truth plus noise is a demonstration and no '
+        'benchmark; for figures, run python -m benchmarks accuracy.')
+    report.heading('What the node said')
+    report.commands(summary.text().splitlines())
+    report.heading('Look further')
+    report.commands(_commands(paths))
+    report.text(f'Written by pop {__version__}.')
+    report.write(paths.report)
+
+
+def error_rows(frames: Sequence[DemoFrame]) -> list[tuple[str, ...]]:
+    """Return the rows (name, count, mean, median, 90th percentile) of the joints' errors."""
+    errors_m = np.concatenate([frame.errors_m for frame in frames])
+    hidden = np.concatenate([frame.hidden for frame in frames])
+    groups = {'visible': errors_m[~hidden], 'hidden': errors_m[hidden]}
+    return [
+        (name, str(len(values)), *(f'{1000 * value:.0f} mm' for value in (
+            values.mean(), np.median(values), np.percentile(values, 90))))
+        for name, values in groups.items() if len(values)]
+
+
+def _caption(frame: DemoFrame) -> str:
+    hidden = frame.errors_m[frame.hidden]
+    seen = frame.errors_m[~frame.hidden]
+    parts = [f'{len(seen)} visible joints off by {1000 * seen.mean():.0f} mm'] if len(seen) else []
+    if len(hidden):
+        parts.append(f'{len(hidden)} hidden ones by {1000 * hidden.mean():.0f} mm')
+    return ', '.join(parts) + ' in the mean'
+
+
+def _commands(paths: DemoPaths) -> list[str]:
+    source = f'--keypoints json --keypoints-dir {_short(paths.keypoints)}'
+    return [
+        f'pop replay {_short(paths.camera_bag)} {source} --every-frame --out again_bag',
+        f'ros2 bag play {_short(paths.bodies_bag)}    # and rviz2 beside it',
+    ]
+
+
+def _short(path: Path) -> str:
+    try:
+        return str(path.resolve().relative_to(Path.cwd()))
+    except ValueError:
+        return str(path)

@@ -1,0 +1,116 @@
+"""Read back what the node published: people by stamp, from a bag of `pop replay`."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pop_core.body.joints import N_JOINTS
+from pop_core.fitting.joint_state import joint_states
+from pop_core.geometry.camera import Camera
+from pop_core.rendering.depth_renderer import render_depth
+from pop_core.rendering.shown_body import ShownBody
+from pop_core.rgbd import RgbdFrame
+from pop_ros.bag_reader import BagReader
+from pop_ros.from_messages import stamp_ns
+from pop_ros.to_messages import CLOUD_TYPE
+
+MESH, JOINTS, CLOUD = '/pop/mesh', '/pop/joints', '/pop/cloud'
+ADD = 0  # visualization_msgs/Marker
+
+
+@dataclass(slots=True, eq=False)
+class RecordedFrame:
+    """What was published with one stamp.
+
+    Args:
+        triangles: Corner points of each person's mesh [m], in the order of the messages.
+        ids: Person of each mesh.
+        joints: The 24 joints of each person [m].
+        cloud: Points of all people.
+    """
+
+    triangles: list[Float[np.ndarray, 'n 3']] = field(default_factory=list)
+    ids: list[int] = field(default_factory=list)
+    joints: Float[np.ndarray, 'p 24 3'] = field(
+        default_factory=lambda: np.zeros((0, N_JOINTS, 3)))
+    cloud: np.ndarray = field(default_factory=lambda: np.zeros(0, CLOUD_TYPE))
+
+
+def read_bodies(bag: Path) -> dict[int, RecordedFrame]:
+    """Return the recorded people of a bag by stamp [ns].
+
+    Raises:
+        BagError: If there is no such bag.
+    """
+    frames: dict[int, RecordedFrame] = defaultdict(RecordedFrame)
+    with BagReader(bag) as reader:
+        for message in reader.messages([MESH, JOINTS, CLOUD]):
+            content = message.read()
+            _add(frames[stamp_ns(content.header)], message.topic, content)
+    return dict(frames)
+
+
+def shown_bodies(
+    recorded: RecordedFrame, frame: RgbdFrame, f: Int[np.ndarray, 'm 3']
+) -> list[ShownBody]:
+    """Return recorded people ready to draw; joint states follow from geometry.
+
+    Args:
+        recorded: What was published for this frame.
+        frame: The frame itself.
+        f: Triangles of the mesh that was published.
+    """
+    bodies = []
+    for corners, person, joints in zip(
+        recorded.triangles, recorded.ids, recorded.joints, strict=False
+    ):
+        vertices = mesh_vertices(corners, f)
+        rendered = render_depth(vertices, f, frame.camera)
+        state = joint_states(joints, rendered, frame.depth_m, frame.camera)
+        points = recorded.cloud[recorded.cloud['person'] == person]
+        bodies.append(ShownBody(vertices, joints, state, cloud_mask(points, frame.camera)))
+    return bodies
+
+
+def mesh_vertices(
+    corners: Float[np.ndarray, 'n 3'], f: Int[np.ndarray, 'm 3']
+) -> Float[np.ndarray, 'v 3']:
+    """Return the vertices of a mesh published as the corners of all its triangles."""
+    vertices = np.zeros((int(f.max()) + 1, 3))
+    vertices[f.ravel()] = corners
+    return vertices
+
+
+def cloud_mask(points: np.ndarray, camera: Camera) -> Bool[np.ndarray, 'h w']:
+    """Return the pixels that published points of one person come from."""
+    xyz = np.column_stack([points[name] for name in 'xyz']).astype(np.float64)
+    u, v = np.rint(camera.project(xyz)).astype(int).T
+    mask = np.zeros((camera.height, camera.width), dtype=bool)
+    mask[np.clip(v, 0, camera.height - 1), np.clip(u, 0, camera.width - 1)] = True
+    return mask
+
+
+def _add(frame: RecordedFrame, topic: str, content: Any) -> None:
+    if topic == CLOUD:
+        frame.cloud = np.frombuffer(bytes(content.data), CLOUD_TYPE)
+    elif topic == JOINTS:
+        places = [_xyz(pose.position) for pose in content.poses]
+        frame.joints = np.array(places, dtype=np.float64).reshape(-1, N_JOINTS, 3)
+    elif content.action == ADD:
+        frame.triangles.append(_all_xyz(content.points))
+        frame.ids.append(int(content.id))
+
+
+def _xyz(point: Any) -> tuple[float, float, float]:
+    return float(point.x), float(point.y), float(point.z)
+
+
+def _all_xyz(points: Sequence[Any]) -> Float[np.ndarray, 'n 3']:
+    return np.array([_xyz(point) for point in points], dtype=np.float64).reshape(-1, 3)

@@ -1,0 +1,111 @@
+"""One-page HTML reports that need no other file: text, tables, pictures and a film strip."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+JPEG_QUALITY = 86
+STYLE = """
+:root { color-scheme: light dark; --ink: #1c2026; --paper: #fafaf8; --line: #d8dade; }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #e6e7ea; --paper: #16181c; --line: #3a3e46; }
+}
+body { font: 16px/1.55 system-ui, sans-serif; color: var(--ink); background: var(--paper);
+       max-width: 1180px; margin: 2.5rem auto; padding: 0 1.25rem; }
+h1 { font-size: 1.7rem; margin-bottom: .2rem; } h2 { font-size: 1.15rem; margin-top: 2.2rem; }
+img { max-width: 100%; border-radius: 6px; display: block; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+th, td { padding: .3rem .9rem .3rem 0; text-align: right; border-bottom: 1px solid var(--line); }
+th:first-child, td:first-child { text-align: left; }
+pre { padding: .8rem 1rem; border: 1px solid var(--line); border-radius: 6px; overflow-x: auto; }
+input[type=range] { width: 100%; margin: .8rem 0 0; }
+figcaption { font-size: .92rem; opacity: .8; margin-top: .35rem; } figure { margin: 1rem 0; }
+"""
+FILM_SCRIPT = """
+for (const film of document.querySelectorAll('.film')) {
+  const frames = JSON.parse(film.querySelector('script').textContent);
+  const [picture, slider, caption] =
+    ['img', 'input', 'figcaption'].map(name => film.querySelector(name));
+  const show = () => {
+    picture.src = 'data:image/jpeg;base64,' + frames[slider.value].jpeg;
+    caption.textContent = frames[slider.value].caption;
+  };
+  slider.addEventListener('input', show); show();
+}
+"""
+
+
+class Report:
+    """A page that is written from top to bottom."""
+
+    def __init__(self, title: str, lead: str) -> None:
+        """Begin a page with a title and a sentence."""
+        self._title = title
+        self._parts = [f'<h1>{html.escape(title)}</h1><p>{html.escape(lead)}</p>']
+
+    def heading(self, text: str) -> None:
+        """Add a heading."""
+        self._parts.append(f'<h2>{html.escape(text)}</h2>')
+
+    def text(self, text: str) -> None:
+        """Add a paragraph."""
+        self._parts.append(f'<p>{html.escape(text)}</p>')
+
+    def commands(self, lines: Sequence[str]) -> None:
+        """Add lines to type."""
+        self._parts.append(f'<pre>{html.escape(chr(10).join(lines))}</pre>')
+
+    def table(self, head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+        """Add a table whose first column is text."""
+        cells = [''.join(f'<td>{html.escape(cell)}</td>' for cell in row) for row in rows]
+        top = ''.join(f'<th>{html.escape(cell)}</th>' for cell in head)
+        body = ''.join(f'<tr>{row}</tr>' for row in cells)
+        self._parts.append(f'<table><tr>{top}</tr>{body}</table>')
+
+    def picture(self, rgb: np.ndarray, caption: str) -> None:
+        """Add a picture."""
+        self._parts.append(
+            f'<figure><img alt="{html.escape(caption)}" '
+            f'src="data:image/jpeg;base64,{_jpeg(rgb)}">'
+            f'<figcaption>{html.escape(caption)}</figcaption></figure>')
+
+    def film(self, pictures: Sequence[np.ndarray], captions: Sequence[str]) -> None:
+        """Add pictures of which a slider shows one."""
+        frames = [
+            {'jpeg': _jpeg(rgb), 'caption': caption}
+            for rgb, caption in zip(pictures, captions, strict=True)]
+        # A closing tag inside the data would end the script.
+        data = json.dumps(frames).replace('</', '<\\/')
+        self._parts.append(
+            '<figure class="film"><img alt="">'
+            f'<input type="range" min="0" max="{len(frames) - 1}" value="{len(frames) // 2}" '
+            'aria-label="frame"><figcaption></figcaption>'
+            f'<script type="application/json">{data}</script></figure>')
+
+    def write(self, path: Path) -> None:
+        """Write the page.
+
+        Raises:
+            OSError: If the file cannot be written.
+        """
+        body = '\n'.join(self._parts)
+        path.write_text(
+            f'<!doctype html><html lang="en"><meta charset="utf-8">'
+            f'<meta name="viewport" content="width=device-width">'
+            f'<title>{html.escape(self._title)}</title><style>{STYLE}</style>'
+            f'<body>{body}<script>{FILM_SCRIPT}</script></body></html>\n', encoding='utf-8')
+
+
+def _jpeg(rgb: np.ndarray) -> str:
+    bgr = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
+    done, content = cv2.imencode('.jpg', bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    if not done:
+        raise OSError('the picture could not be encoded')
+    return base64.b64encode(content.tobytes()).decode('ascii')
