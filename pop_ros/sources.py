@@ -50,7 +50,7 @@ def make_pipeline(
     library_file: Path | None = None,
     progress: Progress | None = None,
 ) -> BodyPipeline:
-    """Return a pipeline with its body model and pose library loaded.
+    """Return a pipeline with its body model and pose library loaded and its kernels compiled.
 
     Args:
         detector: Keypoint source.
@@ -67,11 +67,14 @@ def make_pipeline(
     from pop_core.pipeline import BodyPipeline
     from pop_core.retrieval.default_library import default_library
     from pop_core.retrieval.library_file import load_library
+    from pop_ros.warm_up import warm_up
 
     model = default_body() if body_file is None else load_body_model(body_file)
     told = None if progress is None else _as_counter(progress)
     library = default_library(told) if library_file is None else load_library(library_file)
-    return BodyPipeline(model, library, detector, config)
+    pipeline = BodyPipeline(model, library, detector, config)
+    warm_up(pipeline)
+    return pipeline
 
 
 def _as_counter(progress: Progress) -> Callable[[int, int], None]:
