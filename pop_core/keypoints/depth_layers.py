@@ -32,7 +32,12 @@ class DepthLayers:
     @property
     def present(self) -> Bool[np.ndarray, 's l']:
         """Return which entries hold a surface."""
-        return self.share > 0
+        return np.asarray(self.share > 0)
+
+    @property
+    def known(self) -> Bool[np.ndarray, 's']:
+        """Return which keypoints have a surface under them."""
+        return np.asarray(self.present.any(axis=1))
 
 
 def find_layers(

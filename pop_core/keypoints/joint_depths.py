@@ -2,7 +2,7 @@
 
 Each keypoint shows one or more surfaces. The joint lies behind one of them, or an occluder hides
 it, or the keypoint is wrong. Which of these is true for which joint is what bones decide: no bone
-is longer than a body's.
+is longer than a body's, and skin runs along it without a jump.
 """
 
 from __future__ import annotations
@@ -10,19 +10,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Float32, Int
 
 from pop_core.keypoints import lifting_kernels as kernels
 from pop_core.keypoints.depth_layers import DepthLayers
-from pop_core.keypoints.skeleton import BONE_M, ORDER, TREE_PARENT
+from pop_core.keypoints.skeleton import LEGS, ORDER, PATH_M, TREE_PARENT, linked
 
 BIN_M = 0.03
 MAX_BINS = 320
-HIDDEN_COST = 3.0  # of a joint that lies behind an occluder, in units of -log likelihood
-WRONG_COST = 6.0  # of a keypoint that shows no surface its joint could lie behind
-FOREIGN_COST = 4.0  # of a surface outside the person's mask
+# Costs are -log likelihoods.
+HIDDEN_COST = 2.5  # a joint behind an occluder
+WRONG_COST = 6.0  # a keypoint that shows no surface its joint could lie behind
+FOREIGN_COST = 4.0  # a surface outside the person's mask
 BROKEN_BONE_COST = 8.0
+OCCLUDER_COST = 2.5  # a surface that stands clear in front of the one it should continue
+OCCLUDER_GAP_M = 0.25
 BONE_TOLERANCE_M = 0.05
+LEAN = 0.45  # spread of a bone's depth relative to its length, over varied poses
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,46 +37,72 @@ class JointLayers:
         layers: The surfaces.
         depth_m: Depth of the joint behind each surface [m].
         sigma_m: Standard deviation of that depth [m].
+        price: Cost of each surface in itself.
     """
 
     layers: DepthLayers
     depth_m: Float[np.ndarray, 's l']
     sigma_m: Float[np.ndarray, 's l']
+    price: Float[np.ndarray, 's l']
+
+
+def layer_prices(
+    depth_m: Float32[np.ndarray, 'h w'],
+    keypoints_px: Float[np.ndarray, 's 2'],
+    layers: DepthLayers,
+    jump_ratio: float,
+) -> Float[np.ndarray, 's l']:
+    """Return the cost of lifting each keypoint onto each surface, whatever its depth.
+
+    Surfaces of a small share of the patch cost, and so do those outside the person's mask and
+    those that jump out toward the camera on the way from the next joint: occluders.
+    """
+    price = -np.log(np.maximum(layers.share, 1e-6)) + FOREIGN_COST * (1.0 - layers.own_share)
+    links = linked(layers.known)
+    for j in np.flatnonzero(links >= 0):
+        (u0, v0), (u1, v1) = keypoints_px[links[j]], keypoints_px[j]
+        gap_m = kernels.approach(depth_m, u0, v0, u1, v1, jump_ratio)
+        certainty = 1.0 if links[j] == TREE_PARENT[j] or j in LEGS else 0.5
+        front = layers.depth_m[j] <= layers.depth_m[j][layers.share[j].argmax()]
+        price[j] += front * certainty * OCCLUDER_COST * min(1.0, gap_m / OCCLUDER_GAP_M)
+    return price
 
 
 def choose_depths(
     joints: JointLayers,
     rays: Float[np.ndarray, 's 2'],
     scores: Float[np.ndarray, 's'],
-    scale: float,
-    stretch: float,
+    size: float,
 ) -> Float[np.ndarray, 's']:
-    """Return the most probable depth of each joint [m], hidden ones included.
+    """Return the most probable depth of each joint [m], hidden ones included; NaN without surface.
 
     Args:
         joints: Joint depths behind each surface.
-        rays: (x/z, y/z) of each keypoint; NaN where undetected.
+        rays: (x/z, y/z) of each keypoint.
         scores: Confidence of each keypoint.
-        scale: Size of the person relative to the default body.
-        stretch: Longest bone relative to the mean bone of that size.
+        size: Longest bones relative to the mean bones of the default body.
     """
     present = joints.layers.present
     bins = _bins(joints.depth_m[present])
-    unary = _unary(joints, bins, scores)
+    usable = joints.layers.known
+    links = linked(usable)
+    rows = np.arange(len(scores))
+    longest = np.where(links >= 0, PATH_M[rows, links], 1.0) * size
+    order = np.array([j for j in ORDER if usable[j]])
     chosen = np.zeros(len(scores), dtype=np.int64)
     kernels.tree_depths(
-        unary, bins, rays, TREE_PARENT, ORDER, BONE_M * scale * stretch, BONE_TOLERANCE_M,
+        _unary(joints, bins, scores), bins, rays, links, order, longest, BONE_TOLERANCE_M, LEAN,
         BROKEN_BONE_COST, chosen)
-    return bins[chosen]
+    return np.where(usable, bins[chosen], np.nan)
 
 
 def nearest_layer(
     joints: JointLayers, depth_m: Float[np.ndarray, 's']
 ) -> Int[np.ndarray, 's']:
     """Return the surface behind which each joint lies best at the given depths [m]."""
-    with np.errstate(divide='ignore', invalid='ignore'):
+    with np.errstate(invalid='ignore'):
         misfit = ((depth_m[:, None] - joints.depth_m) / joints.sigma_m) ** 2
-    misfit = misfit - 2.0 * np.log(np.maximum(joints.layers.share, 1e-6))
+    misfit = 0.5 * misfit + joints.price
     return np.where(joints.layers.present, misfit, np.inf).argmin(axis=1)
 
 
@@ -85,18 +115,13 @@ def _bins(depth_m: Float[np.ndarray, 'n']) -> Float[np.ndarray, 'm']:
 def _unary(
     joints: JointLayers, bins: Float[np.ndarray, 'm'], scores: Float[np.ndarray, 's']
 ) -> Float[np.ndarray, 's m']:
-    """Return the cost of each joint at each depth; 0 everywhere where nothing was measured."""
-    layers = joints.layers
-    present = layers.present
-    sigma = np.hypot(joints.sigma_m, 0.5 * (bins[1] - bins[0]))
-    with np.errstate(divide='ignore', invalid='ignore'):
-        gap = (bins[None, None] - joints.depth_m[..., None]) / sigma[..., None]
-    foreign = FOREIGN_COST * (1.0 - layers.own_share)
-    price = foreign - np.log(np.maximum(layers.share, 1e-6))
-    behind = np.where(present[..., None], 0.5 * gap**2 + price[..., None], np.inf).min(axis=1)
-    # Something nearer than the joint hides it; a surface that covers the patch hides it best.
-    hides = present[..., None] & (gap > 0)
-    hidden = np.where(hides, -np.log(np.maximum(layers.share, 1e-6))[..., None], np.inf)
-    cost = np.minimum(behind, hidden.min(axis=1) + HIDDEN_COST)
-    cost = np.minimum(cost, WRONG_COST)
-    return np.where(present.any(axis=1)[:, None], cost * (0.3 + 0.7 * scores[:, None]), 0.0)
+    """Return the cost of each joint at each depth; uncertain keypoints cost less."""
+    present, share = joints.layers.present, joints.layers.share
+    sigma_m = np.hypot(joints.sigma_m, 0.5 * (bins[1] - bins[0]))
+    gap = (bins - joints.depth_m[..., None]) / sigma_m[..., None]
+    behind = 0.5 * gap**2 + joints.price[..., None]
+    # Something nearer than the joint hides it; a surface that fills the patch hides it best.
+    price_hidden = (HIDDEN_COST - np.log(np.maximum(share, 1e-6)))[..., None]
+    hidden = np.where(gap > 0, price_hidden, np.inf)
+    each = np.where(present[..., None], np.minimum(behind, hidden), np.inf)
+    return np.minimum(each.min(axis=1), WRONG_COST) * (0.3 + 0.7 * scores[:, None])

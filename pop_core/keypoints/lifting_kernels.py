@@ -74,34 +74,58 @@ def _keep_layer(z, weight, mine, members, total, layers, kept):
 
 
 @njit(cache=True, nogil=True)
-def tree_depths(unary, bins, rays, parents, order, longest, tolerance, worst, out):
+def approach(depth, u0, v0, u1, v1, jump_ratio):
+    """Return how far the surface jumps toward the camera between two pixels [m], at least 0.
+
+    Smooth changes count nothing: a limb pointing at the camera approaches without a jump, and a
+    hand passed on the way jumps near and far again.
+    """
+    h, w = depth.shape
+    steps = int(np.ceil(max(abs(u1 - u0), abs(v1 - v0), 1.0)))
+    last = np.nan
+    total = 0.0
+    for i in range(steps + 1):
+        x = int(np.rint(u0 + (u1 - u0) * i / steps))
+        y = int(np.rint(v0 + (v1 - v0) * i / steps))
+        if x < 0 or y < 0 or x >= w or y >= h or np.isnan(depth[y, x]):
+            continue
+        z = depth[y, x]
+        if not np.isnan(last) and abs(z - last) > jump_ratio * min(z, last):
+            total += last - z
+        last = z
+    return max(0.0, total)
+
+
+@njit(cache=True, nogil=True)
+def tree_depths(unary, bins, rays, links, order, longest, tolerance, lean, worst, out):
     """Fill out (n) with the bin of each joint that minimises unary and bone costs on the tree.
 
-    A bone costs 0.5 ((length - longest) / tolerance)^2 when too long, `worst` at most, plus a
-    small preference for equal depths. Exact by dynamic programming, leaves first.
+    A link costs 0.5 ((length - longest) / tolerance)^2 when too long, `worst` at most, plus
+    0.5 (dz / (lean longest))^2 for the depth dz along it. Exact by dynamic programming, leaves
+    first.
 
     Args:
         unary: Cost of each joint at each bin (n, m).
         bins: Depth of each bin [m], evenly spaced.
-        rays: (x/z, y/z) of each joint (n, 2); NaN where the pixel is unknown.
-        parents: Parent of each joint, -1 for the root.
-        order: Joints, parents before children.
-        longest: Longest bone from each joint to its parent [m].
+        rays: (x/z, y/z) of each joint (n, 2).
+        links: The joint that each hangs on, -1 for the root and for joints left out.
+        order: Joints to choose for, each after the one it hangs on.
+        longest: Longest distance from each joint to the one it hangs on [m].
         tolerance: Softness of that limit [m].
+        lean: Standard deviation of dz relative to `longest`.
         worst: Most that a broken bone costs.
-        out: Chosen bins, filled.
+        out: Chosen bins, filled for the joints in `order`.
     """
     n, m = unary.shape
     step = bins[1] - bins[0]
     cost = unary.copy()
-    best = np.empty((n, m), dtype=np.int64)
-    for k in range(n - 1, 0, -1):
+    best = np.zeros((n, m), dtype=np.int64)
+    for k in range(len(order) - 1, 0, -1):
         j = order[k]
-        parent = parents[j]
-        lowest = np.argmin(cost[j])
+        parent = links[j]
+        lowest = int(np.argmin(cost[j]))
         fallback = cost[j, lowest] + worst
         band = int(np.ceil((longest[j] + 4.0 * tolerance) / step))
-        seen = not (np.isnan(rays[j, 0]) or np.isnan(rays[parent, 0]))
         for b in range(m):
             smallest = fallback
             chosen = lowest
@@ -109,20 +133,19 @@ def tree_depths(unary, bins, rays, parents, order, longest, tolerance, worst, ou
                 if cost[j, a] >= smallest:
                     continue
                 dz = bins[a] - bins[b]
-                square = dz * dz
-                if seen:
-                    dx = rays[j, 0] * bins[a] - rays[parent, 0] * bins[b]
-                    dy = rays[j, 1] * bins[a] - rays[parent, 1] * bins[b]
-                    square += dx * dx + dy * dy
-                excess = max(0.0, np.sqrt(square) - longest[j]) / tolerance
-                bone = min(worst, 0.5 * excess * excess) + 0.2 * (dz / longest[j]) ** 2
-                if cost[j, a] + bone < smallest:
-                    smallest = cost[j, a] + bone
+                dx = rays[j, 0] * bins[a] - rays[parent, 0] * bins[b]
+                dy = rays[j, 1] * bins[a] - rays[parent, 1] * bins[b]
+                length = np.sqrt(dx * dx + dy * dy + dz * dz)
+                excess = max(0.0, length - longest[j]) / tolerance
+                slope = dz / (lean * longest[j])
+                total = cost[j, a] + min(worst, 0.5 * excess * excess + 0.5 * slope * slope)
+                if total < smallest:
+                    smallest = total
                     chosen = a
             best[j, b] = chosen
             cost[parent, b] += smallest
     root = order[0]
     out[root] = np.argmin(cost[root])
-    for k in range(1, n):
+    for k in range(1, len(order)):
         j = order[k]
-        out[j] = best[j, out[parents[j]]]
+        out[j] = best[j, out[links[j]]]

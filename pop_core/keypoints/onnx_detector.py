@@ -80,7 +80,8 @@ def _load(path: Path) -> onnxruntime.InferenceSession:
         return onnxruntime.InferenceSession(
             path.read_bytes(), options, providers=['CPUExecutionProvider'])
     except OSError as error:
-        raise NetworkShapeError(f'{path}: expected an ONNX file, found: {error.strerror}') from None
+        reason = error.strerror
+        raise NetworkShapeError(f'{path}: expected an ONNX file, found: {reason}') from None
     except Exception as error:  # noqa: BLE001 - ONNX Runtime's errors share no public base
         reason = ' '.join(str(error).split())[:160]
         raise NetworkShapeError(f'{path}: expected an ONNX network, found: {reason}') from None

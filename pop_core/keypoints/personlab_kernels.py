@@ -10,7 +10,7 @@ N_KEYPOINTS = 17
 
 @njit(cache=True, nogil=True)
 def local_maxima(scores, threshold):
-    """Return cells (n, 3) as (row, column, keypoint) above a threshold and their 3x3 neighbours."""
+    """Return cells (n, 3) as (row, column, keypoint): 3x3 maxima of at least a threshold."""
     h, w, k = scores.shape
     found = np.empty((h * w * k, 3), dtype=np.int64)
     n = 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Bool, Float, Int
 
 from pop_core.body.joints import SHARED_INDEX
 
@@ -30,12 +31,42 @@ BONE_M = np.full(len(ORDER), np.nan)  # to the parent; NaN for the root
 for _joint, _parent, _length in BONES:
     TREE_PARENT[SHARED_INDEX[_joint]] = SHARED_INDEX[_parent]
     BONE_M[SHARED_INDEX[_joint]] = _length
+
+
+def _path_lengths() -> Float[np.ndarray, 's s']:
+    """Return the length of the path between any two joints, along mean bones [m]."""
+    path = np.zeros((len(ORDER), len(ORDER)))
+    for k, j in enumerate(ORDER[1:], start=1):
+        others = ORDER[:k]
+        path[j, others] = path[others, j] = path[TREE_PARENT[j], others] + BONE_M[j]
+    return path
+
+
+PATH_M = _path_lengths()
 TORSO = np.array([
     SHARED_INDEX[name] for name in
     ('pelvis', 'neck', 'left_hip', 'right_hip', 'left_shoulder', 'right_shoulder')
+])
+LEGS = np.array([
+    SHARED_INDEX[f'{side}_{name}'] for side in ('left', 'right') for name in ('knee', 'ankle')
 ])
 # Joints whose left and right are easily taken for one.
 LIMB_ENDS = np.array([
     SHARED_INDEX[f'{side}_{name}'] for side in ('left', 'right')
     for name in ('knee', 'ankle', 'elbow', 'wrist')
 ])
+
+
+def linked(present: Bool[np.ndarray, 's']) -> Int[np.ndarray, 's']:
+    """Return each present joint's nearest present ancestor: the tree without the others.
+
+    Where no ancestor is present, it is the first present joint; that one has none (-1).
+    """
+    rows = [int(j) for j in ORDER if present[j]]
+    out = np.full(len(ORDER), -1)
+    for j in rows[1:]:
+        up = int(TREE_PARENT[j])
+        while up >= 0 and not present[up]:
+            up = int(TREE_PARENT[up])
+        out[j] = up if up >= 0 else rows[0]
+    return out

@@ -12,14 +12,14 @@ from jaxtyping import Float
 from pop_core.body.joints import SHARED_INDEX, SHARED_NAMES
 
 # Metres for a body of scale 1: seen from the front, the side and the back, then the spread about
-# them. The nose lies on the skin; from behind, the whole head lies between.
+# them. The nose lies on the skin.
 _TABLE = {
     'pelvis': (0.192, 0.202, 0.137, 0.035),
     'hip': (0.170, 0.101, 0.126, 0.047),
     'knee': (0.075, 0.066, 0.085, 0.018),
     'ankle': (0.065, 0.039, 0.052, 0.012),
     'neck': (0.095, 0.110, 0.085, 0.050),
-    'head': (-0.005, 0.010, 0.160, 0.025),
+    'head': (-0.005, 0.010, 0.030, 0.025),
     'shoulder': (0.087, 0.063, 0.098, 0.035),
     'elbow': (0.059, 0.040, 0.055, 0.022),
     'wrist': (0.031, 0.027, 0.040, 0.018),
