@@ -92,9 +92,9 @@ def learn(c: np.ndarray, weight: np.ndarray, k: int, seed: int = 0) -> PosePrior
     for _ in range(40):
         responsibility = share * weight[:, None]
         parts = [fit_component(c, responsibility[:, i]) for i in range(k)]
-        prior = PosePrior(
-            responsibility.sum(axis=0) / responsibility.sum(),
-            *(np.stack(arrays) for arrays in zip(*parts, strict=True)), np.ones(k, dtype=bool))
+        means, factors, variances = (np.stack(arrays) for arrays in zip(*parts, strict=True))
+        shares = responsibility.sum(axis=0) / responsibility.sum()
+        prior = PosePrior(shares, means, factors, variances, np.ones(k, dtype=bool))
         cost = prior.component_costs(c)
         share = np.exp(-cost - np.logaddexp.reduce(-cost, axis=1)[:, None])
     return prior
@@ -111,12 +111,12 @@ def procedural_coordinates(batches: int = 120) -> np.ndarray:
 
 def joined(motion: PosePrior, rules: PosePrior) -> PosePrior:
     """Return one mixture of both, each counting for half."""
-    pairs = [
+    weights, means, factors, variances = (
         np.concatenate([getattr(motion, name), getattr(rules, name)])
         for name in ('weights', 'means', 'factors', 'variances')
-    ]
-    from_motion = np.arange(len(pairs[0])) < len(motion.weights)
-    return PosePrior(0.5 * pairs[0], *pairs[1:], from_motion)
+    )
+    from_motion = np.arange(len(weights)) < len(motion.weights)
+    return PosePrior(0.5 * weights, means, factors, variances, from_motion)
 
 
 def mean_log_density(prior: PosePrior, c: np.ndarray, weight: np.ndarray) -> float:

@@ -125,14 +125,14 @@ def load_pose_prior(path: Path = DEFAULT_FILE) -> PosePrior:
     """
     try:
         with np.load(path) as data:
-            arrays = [
+            weights, means, factors, variances = (
                 data[name].astype(np.float64)
                 for name in ('weights', 'means', 'factors', 'variances')
-            ]
+            )
             from_motion = data['from_motion']
     except (OSError, KeyError, ValueError) as error:
         raise LibraryFileError(
             f'{path}: expected an npz with weights, means, factors, variances and '
             f'from_motion, found {error}'
         ) from error
-    return PosePrior(*arrays, from_motion)
+    return PosePrior(weights, means, factors, variances, from_motion)

@@ -34,9 +34,9 @@ class RetrievalConfig:
     """Settings of retrieval."""
 
     candidates: int = setting(
-        6, minimum=1, maximum=64, about='Poses to return: the hypotheses of the fit.')
+        6, minimum=1.0, maximum=64.0, about='Poses to return: the hypotheses of the fit.')
     shortlist: int = setting(
-        256, minimum=1, maximum=4096, about='Best poses by Eq. (1) that are ranked again.')
+        256, minimum=1.0, maximum=4096.0, about='Best poses by Eq. (1) that are ranked again.')
     pose_sigma_m: float = setting(
         0.04, unit='m', minimum=0.001, maximum=0.5,
         about='How far joints of the right pose may lie off: proportions and library spacing.')
@@ -55,7 +55,7 @@ class RetrievalConfig:
         1.25, minimum=1.0, maximum=2.0, about='Largest person, in sizes of the library body.')
     same_visibility: bool = setting(
         False, about='Only poses recorded with the same visible joints, as in the paper.')
-    threads: int = setting(2, minimum=1, maximum=64, about='Threads of the search.')
+    threads: int = setting(2, minimum=1.0, maximum=64.0, about='Threads of the search.')
 
 
 def retrieve(

@@ -24,8 +24,8 @@ Posture = Callable[[Figures, Draw], None]
 def vectors(
     x: Float[np.ndarray, '*n'] | float, y: Float[np.ndarray, '*n'] | float,
     z: Float[np.ndarray, '*n'] | float,
-) -> Float[np.ndarray, 'n 3']:
-    """Return one vector per figure of components that are numbers or one number per figure."""
+) -> Float[np.ndarray, '*n 3']:
+    """Return vectors of components that are one number for all or one number per figure."""
     return np.stack(np.broadcast_arrays(x, y, z), axis=-1).astype(np.float64)
 
 
@@ -76,7 +76,7 @@ def walking(figures: Figures, rng: Draw) -> None:
         sign = SIDES[side]
         yaw = np.zeros(n)
         figures.set_leg(
-            side, normalised(direction(pitch, yaw) + vectors(0.04 * sign, 0, 0)),
+            side, normalised(direction(pitch, yaw) + vectors(0.04 * sign, 0.0, 0.0)),
             direction(pitch - bend, yaw), np.tile(FORWARD, (n, 1)))
         figures.aim_foot(side, vectors(
             np.clip(bend - pitch, -0.4, 0.9), sign * rng.normal(0.1, 0.1, n), 0.0))
@@ -220,11 +220,11 @@ def lying(figures: Figures, rng: Draw) -> None:
         fold = np.where(rng.random(n) < 0.5, rng.uniform(0, 0.25, n), rng.uniform(0.2, 2.2, n))
         thigh_pitch = fold * rng.uniform(0.4, 0.9, n) * np.where(np.cos(roll) < -0.5, 0.1, 1.0)
         yaw = sign * rng.uniform(-0.1, 0.6, n)
-        thigh = normalised(direction(thigh_pitch, yaw) + vectors(0.1 * sign, 0, 0))
+        thigh = normalised(direction(thigh_pitch, yaw) + vectors(0.1 * sign, 0.0, 0.0))
         figures.set_leg(
             side, thigh, direction(thigh_pitch - fold, yaw * rng.uniform(0, 1, n)),
             np.tile(FORWARD, (n, 1)))
-        figures.turn_joint(f'{side}_ankle', vectors(rng.uniform(-0.1, 0.7, n), 0, 0))
+        figures.turn_joint(f'{side}_ankle', vectors(rng.uniform(-0.1, 0.7, n), 0.0, 0.0))
     # The body is laid down whole: legs were drawn in the pelvis' own frame (tilt zero).
     figures.tilt = laid_down(roll)
 

@@ -1,0 +1,158 @@
+import numpy as np
+import pytest
+
+from pop_core.body.default_body import default_body
+from pop_core.body.joints import SHARED_INDEX
+from pop_core.body.kinematics import attached_positions
+from pop_core.body.model import BodyParameters, shared_points
+from pop_core.errors import LibraryFileError
+from pop_core.geometry.camera import Camera
+from pop_core.geometry.rotation import from_rotvec, to_rotvec
+from pop_core.keypoints.lifted_joints import LiftedJoints, LiftState
+from pop_core.retrieval.default_library import generate_library
+from pop_core.retrieval.pose_library import PoseLibrary, build_library, visibility_mask
+from pop_core.retrieval.retrieve import RetrievalConfig, choose_diverse, retrieve
+
+UPRIGHT = from_rotvec(np.array([np.pi, 0.0, 0.0]))
+ARM = [SHARED_INDEX['left_elbow'], SHARED_INDEX['left_wrist']]
+LEGS = [SHARED_INDEX[f'{side}_{name}'] for side in ('left', 'right') for name in ('knee', 'ankle')]
+
+
+@pytest.fixture(scope='module')
+def library() -> PoseLibrary:
+    return generate_library(default_body(), 4000, seed=1)
+
+
+def seen_from(joints: np.ndarray, hidden: list[int] = []) -> LiftedJoints:  # noqa: B006
+    positions, sigma = joints.copy(), np.full(15, 0.02)
+    state = np.full(15, int(LiftState.VISIBLE))
+    positions[hidden], sigma[hidden], state[hidden] = np.nan, np.inf, int(LiftState.MISSING)
+    return LiftedJoints(positions, sigma, state, np.full((15, 2), np.nan), np.ones(15))
+
+
+def placed(library: PoseLibrary, row: int, scale: float = 0.95, yaw: float = 0.7) -> np.ndarray:
+    R = UPRIGHT @ from_rotvec(np.array([0.0, yaw, 0.0]))
+    return scale * library.joints[row].astype(float) @ R.T + [0.2, 0.1, 3.0]
+
+
+def test_a_pose_of_the_library_finds_itself(library):
+    for row in (3, 700, 3999):
+        joints = placed(library, row)
+        best = retrieve(library, seen_from(joints))[0]
+        assert best.index == row
+        assert best.residual_m < 1e-3
+        assert np.allclose(best.joints_camera, joints, atol=1e-3)
+        assert np.isclose(best.scale, 0.95, atol=1e-3)
+
+
+def test_candidate_is_the_body_that_its_parameters_pose(library):
+    model = default_body()
+    candidate = retrieve(library, seen_from(placed(library, 42), ARM))[1]
+    posed = attached_positions(shared_points(model), model, BodyParameters(
+        np.zeros(3), to_rotvec(candidate.R_camera_body), candidate.body_pose, np.zeros(10)))
+    found = candidate.scale * (posed - model.joint_template[0]) + candidate.t_camera_body
+    assert np.allclose(found, candidate.joints_camera, atol=1e-4)
+
+
+def test_all_joints_but_a_hidden_arm_still_find_the_pose(library):
+    indices = [c.index for c in retrieve(library, seen_from(placed(library, 1234), ARM))]
+    assert indices[0] == 1234
+
+
+def test_candidates_differ_where_nothing_was_seen(library):
+    candidates = retrieve(library, seen_from(placed(library, 55), LEGS))
+    legs = np.stack([c.joints_camera[LEGS] for c in candidates])
+    gaps = np.linalg.norm(legs[:, None] - legs[None], axis=3).mean(axis=2)
+    assert len(candidates) == 6
+    assert gaps[~np.eye(6, dtype=bool)].min() >= 0.12
+
+
+def test_belief_sums_to_one_and_falls(library):
+    weights = [c.weight for c in retrieve(library, seen_from(placed(library, 9), LEGS))]
+    assert np.isclose(sum(weights), 1.0)
+    assert weights == sorted(weights, reverse=True)
+
+
+def test_a_scene_that_cannot_hide_legs_rules_them_out(library):
+    joints = placed(library, 2000, yaw=0.0)
+
+    def hides(points: np.ndarray) -> np.ndarray:
+        """Only within 5 cm of the true legs can anything hide."""
+        gap = np.linalg.norm(points[:, None] - joints[LEGS], axis=2).min(axis=1)
+        return np.maximum(gap - 0.05, 0.0)
+
+    config = RetrievalConfig(shortlist=1000)
+    noisy = joints + np.random.default_rng(0).normal(size=joints.shape) * 0.02
+
+    def error(candidate) -> float:
+        return float(np.linalg.norm(candidate.joints_camera - joints, axis=1)[LEGS].mean())
+
+    blind = retrieve(library, seen_from(noisy, LEGS), config)
+    told = retrieve(library, seen_from(noisy, LEGS), config, hides=hides)
+    assert error(told[0]) <= min(error(c) for c in blind)
+    assert error(told[0]) < 0.15
+
+
+def test_rays_of_pixels_without_depth_pull_hidden_joints(library):
+    camera = Camera(640, 480, 525.0, 525.0, 319.5, 239.5)
+    others = library.subset(np.arange(30, len(library)))
+    gains = []
+    for row in range(30):
+        joints = placed(library, row)
+        lifted = seen_from(joints, ARM)
+        lifted = LiftedJoints(
+            lifted.positions_camera, lifted.sigma_m, lifted.state, camera.project(joints),
+            lifted.scores)
+        errors = [
+            np.linalg.norm(found[0].joints_camera - joints, axis=1)[ARM].mean()
+            for found in (retrieve(others, lifted), retrieve(others, lifted, camera=camera))
+        ]
+        gains.append(errors[0] - errors[1])
+    assert np.mean(gains) > 0.05
+
+
+def test_gravity_keeps_people_upright(library):
+    joints = placed(library, 321)
+    fallen = (joints - joints[0]) @ from_rotvec(np.array([0.0, 0.0, 1.3])).T + joints[0]
+    down = np.array([0.0, 1.0, 0.0])
+    free = retrieve(library, seen_from(fallen))[0]
+    held = retrieve(library, seen_from(fallen), gravity=down)
+    assert free.index == 321
+    for candidate in held:
+        tilt = from_rotvec(library.tilt[candidate.index].astype(float))
+        up = candidate.R_camera_body @ tilt.T @ [0.0, 1.0, 0.0]
+        assert np.allclose(up, -down, atol=1e-6)
+    assert retrieve(library, seen_from(joints), gravity=down)[0].index == 321
+
+
+def test_two_joints_are_not_enough(library):
+    joints = placed(library, 0)
+    assert retrieve(library, seen_from(joints, list(range(2, 15)))) == []
+
+
+def test_same_visibility_keeps_to_poses_recorded_alike(library):
+    masks = np.full(len(library), visibility_mask(np.ones(15, dtype=bool)), dtype=np.uint16)
+    seen = np.ones(15, dtype=bool)
+    seen[ARM] = False
+    alike = np.arange(0, len(library), 7)
+    masks[alike] = visibility_mask(seen)
+    recorded = PoseLibrary(
+        library.body_pose, library.tilt, library.columns, masks, library.weights)
+    config = RetrievalConfig(same_visibility=True)
+    found = retrieve(recorded, seen_from(placed(library, 8), ARM), config)
+    assert len(found) == 6
+    assert all(candidate.index in alike for candidate in found)
+
+
+def test_diversity_is_relaxed_until_enough_are_found():
+    joints = np.zeros((5, 15, 3))
+    joints[:, :, 0] = np.arange(5)[:, None] * 0.01
+    chosen = choose_diverse(
+        joints, np.arange(5.0), np.zeros(15, dtype=bool), RetrievalConfig(candidates=4))
+    assert chosen[0] == 0
+    assert len(set(chosen.tolist())) == 4
+
+
+def test_an_empty_library_is_refused():
+    with pytest.raises(LibraryFileError, match='> 0'):
+        build_library(np.zeros((0, 23, 3)), default_body())
