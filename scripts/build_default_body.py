@@ -53,12 +53,14 @@ def main() -> None:
     area = vertex_areas(bodies[0].mean(0), faces)
     mean, directions = shape_space.shape_directions(*bodies, CHILD_SHARE, area)
     space = shape_space.ShapeSpace(mean, directions, area)
-    weights = mirrored_weights(strongest(half.rows @ source.weights, 4)[origin], side, mirror_of)
+    weights = strongest(
+        mirrored_weights((half.rows @ source.weights)[origin], side, mirror_of), 4
+    )
     regressor = fit_regressor(space, bodies, skeletons, mirror_of)
     save(
         out, space, faces, weights=weights.astype(np.float32),
         J_regressor=regressor.astype(np.float32), mirror=mirror_of.astype(np.int32),
-    )  # fmt: skip
+    )
     report_mesh(out, space, faces)
     report_people('adults', bodies[0], space)
     report_people('children', bodies[1], space)
@@ -96,10 +98,12 @@ def mirrored_weights(
 
 
 def strongest(weights: np.ndarray, count: int) -> np.ndarray:
-    """Keep each row's strongest weights, scaled back to a sum of one."""
-    weakest = np.argsort(-weights, axis=1, kind='stable')[:, count:]
-    kept = weights.copy()
-    np.put_along_axis(kept, weakest, 0.0, axis=1)
+    """Keep each row's strongest weights, scaled back to a sum of one.
+
+    Equal weights stay or go together: on the midline they belong to a left and a right joint.
+    """
+    strongest_left_out = -np.sort(-weights, axis=1)[:, [count]]
+    kept = np.where(weights > strongest_left_out + 1e-9, weights, 0.0)
     return kept / kept.sum(1, keepdims=True)
 
 
@@ -113,7 +117,7 @@ def vertex_areas(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 def fit_regressor(
     space: shape_space.ShapeSpace, bodies: list[np.ndarray], skeletons: list[np.ndarray],
     mirror_of: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Fit the regressor to the joints' own linear dependence on the betas, and print its error."""
     joint_mean = skeletons[0].mean(0)
     offsets = (np.concatenate(skeletons) - joint_mean).reshape(-1, joint_mean.size)

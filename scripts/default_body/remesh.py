@@ -29,7 +29,9 @@ class HalfMesh:
 
     def follow(self, source_vertices: np.ndarray) -> np.ndarray:
         """Return these vertices on people (p, n_source, 3) in the pose of this mesh [m]."""
-        return np.stack([self.rows @ person for person in source_vertices]) + self.offsets
+        vertices = np.stack([self.rows @ person for person in source_vertices]) + self.offsets
+        vertices[:, self.on_plane, 0] = 0.0
+        return vertices
 
 
 def remesh_half(
@@ -52,7 +54,6 @@ def remesh_half(
     points[on_plane, 0] = 0.0
     rows = _closest_rows(points, vertices, faces)
     offsets = points - rows @ vertices
-    offsets[on_plane, 0] = 0.0
     return HalfMesh(points, triangles, rows, offsets, on_plane)
 
 
@@ -118,20 +119,20 @@ def _spread_evenly(meshes: pymeshlab.MeshSet, joints: np.ndarray) -> None:
     meshes.meshing_decimation_quadric_edge_collapse(
         targetfacenum=HAND_FACES, qualitythr=0.6, preservenormal=True, preservetopology=True,
         selected=True,
-    )  # fmt: skip
+    )
     _remesh(meshes, HAND_LONGEST_EDGE_M, hand, iterations=3, crease_deg=180, collapseflag=False)
 
 
 def _remesh(
     meshes: pymeshlab.MeshSet, edge_m: float, where: str = '', *, iterations: int = 8,
     crease_deg: float = 80, collapseflag: bool = True,
-) -> None:  # fmt: skip
+) -> None:
     if where:
         meshes.compute_selection_by_condition_per_face(condselect=where)
     meshes.meshing_isotropic_explicit_remeshing(
         iterations=iterations, targetlen=pymeshlab.PureValue(edge_m), featuredeg=crease_deg,
         checksurfdist=False, selectedonly=bool(where), collapseflag=collapseflag,
-    )  # fmt: skip
+    )
 
 
 def _border_vertices(faces: np.ndarray, count: int) -> np.ndarray:

@@ -56,7 +56,7 @@ def shape_directions(
 def joint_regressor(
     space: ShapeSpace, joint_mean: np.ndarray, joint_directions: np.ndarray,
     mirror_of: np.ndarray, joint_mirror: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Return sparse rows (24, v) that give the joints of the shape space.
 
     Each joint is a combination of its nearest vertices, small in squares, that fits

@@ -22,12 +22,12 @@ JOINT_BONES = (
     'spine02', 'foot.L', 'foot.R', 'spine01', 'toe1-1.L', 'toe1-1.R', 'neck01', 'clavicle.L',
     'clavicle.R', 'head', 'upperarm01.L', 'upperarm01.R', 'lowerarm01.L', 'lowerarm01.R',
     'wrist.L', 'wrist.R', 'finger3-1.L', 'finger3-1.R',
-)  # fmt: skip
+)
 # Bones that do not follow their nearest driving ancestor: prefix without side -> joint's bone.
 MERGED_PREFIXES = {
     'finger1': 'wrist', 'finger2': 'finger3-1', 'finger4': 'finger3-1', 'finger5': 'finger3-1',
     'toe': 'toe1-1',
-}  # fmt: skip
+}
 TO_BODY_AXES = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]], dtype=np.float64)
 
 
