@@ -60,7 +60,7 @@ def run(argv: list[str]) -> int:
     key = run_key([repr(config), repr(options.keypoints), repr(sorted(methods))])
     cache = FrameCache(cache_folder() / f'accuracy-{key}.jsonl')
     seeds = range(options.seed, options.seed + options.frames)
-    measure(model, methods, detector, seeds, cache, console)
+    measure(model, methods, detector, seeds=seeds, cache=cache, console=console)
     entries = [cache.done[seed] for seed in seeds]
     report = summary_of(entries, list(methods))
     print_report(report, console)
@@ -124,7 +124,7 @@ def make_methods(
 
 
 def measure(
-    model: BodyModel, methods: dict[str, Method], detector: GivenDetections, seeds: range,
+    model: BodyModel, methods: dict[str, Method], detector: GivenDetections, *, seeds: range,
     cache: FrameCache, console: Console,
 ) -> None:
     """Run every method on every scene that the cache does not hold yet."""

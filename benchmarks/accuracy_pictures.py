@@ -18,7 +18,8 @@ from benchmarks.accuracy_records import CURVE_M, Record, match, observed_points
 from pop_core.body.model import BodyModel
 from pop_core.body.skinning import vertices
 from pop_core.rendering.depth_renderer import render_depth
-from pop_core.synthesis.scenes import PersonTruth, SyntheticScene, synthesise_scene
+from pop_core.synthesis.scenes import SyntheticScene, synthesise_scene
+from pop_core.synthesis.truth import PersonTruth
 
 BLACK_M = 0.03
 HEAT_SCENES = 6

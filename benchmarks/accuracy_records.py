@@ -17,7 +17,8 @@ from pop_core.body.skinning import vertices
 from pop_core.estimate import JointState
 from pop_core.rendering.depth_renderer import render_depth
 from pop_core.rgbd import flying_pixels, point_cloud
-from pop_core.synthesis.scenes import PersonTruth, SyntheticScene
+from pop_core.synthesis.scenes import SyntheticScene
+from pop_core.synthesis.truth import PersonTruth
 
 Record = dict[str, Any]
 MATCH_M = 1.0          # a body farther from everybody's pelvis is nobody's

@@ -18,7 +18,8 @@ from pop_core.synthesis.occluders import bare_table
 from pop_core.synthesis.people import Actor, actor_at
 from pop_core.synthesis.poses import walking_pose
 from pop_core.synthesis.rooms import draw_clutter, draw_room
-from pop_core.synthesis.scenes import SyntheticScene, photograph, render_truth
+from pop_core.synthesis.scenes import SyntheticScene, photograph
+from pop_core.synthesis.truth import render_truth
 
 STEP_PAIR_S = 1.1
 STEP_PAIR_M = 1.25
@@ -27,7 +28,7 @@ CAMERA = CameraRange(
 
 
 def synthesise_sequence(
-    model: BodyModel, seed: int, n_frames: int, rate_hz: float = 15.0,
+    model: BodyModel, seed: int, n_frames: int, *, rate_hz: float = 15.0,
     sensor: str = 'structured_light', start_ns: int = 1_700_000_000_000_000_000,
     progress: Callable[[int], None] | None = None,
 ) -> list[SyntheticScene]:
@@ -54,7 +55,8 @@ def synthesise_sequence(
         layout = replace(stage, actors=(actor,))
         stamp = start_ns + round(k * 1e9 / rate_hz)
         truth = render_truth(model, layout)
-        scenes.append(photograph(model, layout, truth, sensor, seed * 100_003 + k, stamp))
+        scenes.append(photograph(
+            model, layout, truth, sensor=sensor, seed=seed * 100_003 + k, stamp_ns=stamp))
         if progress is not None:
             progress(k + 1)
     return scenes

@@ -54,8 +54,9 @@ def joined(surfaces: Sequence[Surface]) -> Stage:
 
 
 def shade(
-    stage: Stage, rendered: RenderedDepth, camera: Camera, T_room_camera: Float[np.ndarray, '4 4'],
-    light_room: Float[np.ndarray, '3'], rng: np.random.Generator,
+    stage: Stage, rendered: RenderedDepth, camera: Camera, *,
+    T_room_camera: Float[np.ndarray, '4 4'], light_room: Float[np.ndarray, '3'],
+    rng: np.random.Generator,
 ) -> UInt8[np.ndarray, 'h w 3']:
     """Return the colour image of a rendered stage.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pop_core.body.joints import JOINT_INDEX, N_JOINTS, PARENTS, SHARED
+from pop_core.body.joints import JOINT_INDEX, N_JOINTS, PARENTS, SHARED, SHARED_INDEX
 from pop_core.estimate import JointState
 from pop_core.geometry.camera import Camera
 
@@ -33,8 +33,8 @@ def joint_states(
     state = np.full(N_JOINTS, JointState.OUT_OF_IMAGE, dtype=np.int64)
     inside, u, v = _pixels(joints, camera)
     own, part, others = own_depth_m[v, u], own_part[v, u], others_depth_m[v, u]
-    gap = joints[:, 2] - own
-    with_skin = np.isfinite(own) & _NEXT_TO[np.arange(N_JOINTS), part] & (gap < _DEEPEST_M)
+    near_skin = joints[:, 2] - own < _deepest()
+    with_skin = np.isfinite(own) & _NEXT_TO[np.arange(N_JOINTS), part] & near_skin
     # At the rim a joint's pixel may just miss the body: then the joint itself is what is hidden.
     front = np.where(np.isfinite(own), np.minimum(own, joints[:, 2]), joints[:, 2])
     seen = np.where(with_skin | ~np.isfinite(own), JointState.VISIBLE, JointState.SELF_OCCLUDED)
@@ -49,7 +49,7 @@ def shared_states(
 ) -> Int[np.ndarray, '15']:
     """Return a JointState per shared point; the head's is that of the nose, a skin point."""
     out = states[SHARED].copy()
-    row = int(np.flatnonzero(SHARED == JOINT_INDEX['head'])[0])
+    row = SHARED_INDEX['head']
     inside, u, v = _pixels(nose[None], camera)
     if not inside[0]:
         out[row] = JointState.OUT_OF_IMAGE
@@ -97,4 +97,3 @@ def _deepest() -> Float[np.ndarray, '24']:
 
 
 _NEXT_TO = _neighbours()
-_DEEPEST_M = _deepest()

@@ -120,7 +120,7 @@ def test_few_candidate_triangles_find_the_distance_that_all_triangles_give(model
     assert np.abs(few - every).max() < 5e-4
 
 
-def test_points_of_a_mesh_are_nearer_to_its_surface_than_to_its_vertices(model, rng):
+def test_points_of_a_mesh_are_nearer_to_its_surface_than_to_its_vertices(model):
     mesh = vertices(model, rest_parameters())
     middles = mesh[model.f].mean(axis=1)[::50]
     assert metrics.distance_to_surface(middles, mesh, model.f).max() < 1e-9

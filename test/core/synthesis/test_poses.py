@@ -5,7 +5,8 @@ from pop_core.body.joints import JOINT_INDEX, MIRROR
 from pop_core.body.kinematics import joints
 from pop_core.body.model import BodyParameters
 from pop_core.synthesis.arms import reach
-from pop_core.synthesis.poses import POSE_KINDS, draw_pose, limbs_clear, mirrored, walking_pose
+from pop_core.synthesis.pose_parts import limbs_clear
+from pop_core.synthesis.poses import POSE_KINDS, draw_pose, mirrored, walking_pose
 
 
 def posed_joints(model, body_pose):
