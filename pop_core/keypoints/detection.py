@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int8
@@ -42,6 +42,8 @@ class Detection:
         return float(self.scores.mean())
 
 
+@runtime_checkable  # so that tests can check arguments of this type
+@runtime_checkable
 class KeypointDetector(Protocol):
     """Anything that finds people in a frame."""
 
