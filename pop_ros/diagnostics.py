@@ -13,6 +13,7 @@ from pop_ros.pairing import PairStatistics
 from pop_ros.statistics import Snapshot
 
 DROP_PREFIX = 'dropped: '
+MISSED = 'colour images without depth'
 MANY_DROPS = 0.5  # share of dropped pairs since the last report that deserves a warning
 
 
@@ -77,7 +78,7 @@ def _values(
     yield 'frames', str(now.frames)
     yield 'pending', str(now.pending)
     yield 'people', str(now.people)
-    yield 'colour images without depth', str(pairs.missed)
+    yield MISSED, str(pairs.missed)
     if pairs.skews_ns:
         skew_ms = np.abs(np.array(pairs.skews_ns)) / 1e6
         yield 'pair skew', percentiles(skew_ms.tolist())

@@ -89,7 +89,9 @@ class InputTopic:
     def _same_type(self) -> tuple[str, ...]:
         name = f'{self._kind.__module__.split(".")[0]}/msg/{self._kind.__name__}'
         known = self._node.get_topic_names_and_types()
-        return tuple(topic for topic, types in known if name in types and topic != self.topic)
+        same = [topic for topic, types in known if name in types and topic != self.topic]
+        wants_depth = 'depth' in self.role
+        return tuple(sorted(same, key=lambda topic: ('depth' in topic) != wants_depth))
 
     def _receive(self, message: Any) -> None:
         self._count += 1

@@ -24,7 +24,7 @@ from pop_ros.bag_reader import BagReader
 from pop_ros.bag_topics import RgbdTopics
 from pop_ros.bag_writer import BagWriter
 from pop_ros.body_messages import OUTPUT_TYPES
-from pop_ros.diagnostics import DROP_PREFIX, read_values
+from pop_ros.diagnostics import DROP_PREFIX, MISSED, read_values
 from pop_ros.inputs import COLOR, DEPTH, INFO
 from pop_ros.node_arguments import SourceArguments
 from pop_ros.qos import output_qos
@@ -76,6 +76,7 @@ class DdsPlayer:
         self._check = check
         self._writer: BagWriter | None = None
         self._values: dict[str, str] = {}
+        self._before: dict[str, str] = {}
         self._context = Context()
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
         self._node = Node('pop_replay', context=self._context)
@@ -109,7 +110,8 @@ class DdsPlayer:
             ReplayError: If it does not within `timeout_s`.
         """
         def is_ready() -> bool:
-            return all(p.get_subscription_count() for p in self._publishers.values())
+            subscribed = all(p.get_subscription_count() for p in self._publishers.values())
+            return subscribed and bool(self._values)
 
         if not self._spin(timeout_s, is_ready):
             raise ReplayError(
@@ -117,7 +119,8 @@ class DdsPlayer:
                 f'{timeout_s:.0f} s, found none: is it running in this ROS_DOMAIN_ID?')
 
     def record_into(self, writer: BagWriter) -> None:
-        """Write every output from now on into an open bag."""
+        """Write every output from now on into an open bag, and count from now on."""
+        self._before = self._values
         announce_outputs(writer)
         self._writer = writer
 
@@ -153,13 +156,20 @@ class DdsPlayer:
         self._values.clear()
         if not self._spin(IDLE_S, is_idle):
             summary.notes.append(f'the node was still busy after {IDLE_S:.0f} s')
-        summary.pairs = int(self._values.get('pairs', 0))
-        summary.frames = int(self._values.get('frames', 0))
-        summary.people = int(self._values.get('people', 0))
+        summary.pairs = self._count('pairs')
+        summary.frames = self._count('frames')
+        summary.people = self._count('people')
         summary.latency_text = self._values.get('latency (pair to published)', '-')
-        for key, value in self._values.items():
-            if key.startswith(DROP_PREFIX):
-                summary.drops[key[len(DROP_PREFIX):]] = int(value)
+        missed = self._count(MISSED)
+        if missed:
+            summary.notes.append(f'{missed} colour images without depth; the node says why')
+        for key in self._values:
+            if key.startswith(DROP_PREFIX) and self._count(key):
+                summary.drops[key[len(DROP_PREFIX):]] = self._count(key)
+
+    def _count(self, key: str) -> int:
+        """Return what a count of the node has grown by since the recording began."""
+        return int(self._values.get(key, 0)) - int(self._before.get(key, 0))
 
     def _spin(self, timeout_s: float, done: Callable[[], bool]) -> bool:
         """Handle messages until `done` or the time is over; return whether it was done."""
