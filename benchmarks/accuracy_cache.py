@@ -40,7 +40,10 @@ class FrameCache:
         self.done: dict[int, dict[str, Any]] = {}
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.is_file():
-            for line in path.read_text(encoding='utf-8').splitlines():
+            text = path.read_text(encoding='utf-8')
+            if text and not text.endswith('\n'):
+                path.write_text(text + '\n', encoding='utf-8')  # a new line starts after it
+            for line in text.splitlines():
                 try:
                     entry = json.loads(line)
                 except ValueError:

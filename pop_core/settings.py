@@ -34,8 +34,8 @@ class Setting:
     default: Value
     unit: str
     about: str
-    minimum: float | None
-    maximum: float | None
+    minimum: float | int | None
+    maximum: float | int | None
 
 
 def setting(
@@ -43,8 +43,8 @@ def setting(
     *,
     unit: str = '',
     about: str,
-    minimum: float | None = None,
-    maximum: float | None = None,
+    minimum: float | int | None = None,
+    maximum: float | int | None = None,
 ) -> Any:
     """Declare a config field with its unit, sentence and bounds."""
     metadata = {'unit': unit, 'about': about, 'minimum': minimum, 'maximum': maximum}
