@@ -43,7 +43,6 @@ class Detection:
 
 
 @runtime_checkable  # so that tests can check arguments of this type
-@runtime_checkable
 class KeypointDetector(Protocol):
     """Anything that finds people in a frame."""
 
