@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Shaped, UInt8
@@ -12,6 +12,8 @@ from jaxtyping import Shaped, UInt8
 from pop_core.keypoints.detection import Detection
 
 Tensor = Shaped[np.ndarray, '...']
+# One pass of the network: the outputs of one input, in the network's order.
+Run = Callable[[Tensor], Sequence[Tensor]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +43,7 @@ class NetworkSpec:
         return ' -> '.join(sides)
 
 
+@runtime_checkable
 class NetworkDecoder(Protocol):
     """Understands one family of networks: prepares its input, turns its outputs into people."""
 
@@ -56,16 +59,6 @@ class NetworkDecoder(Protocol):
         """Return whether this family's inputs and outputs look like that."""
         ...
 
-    def detect(
-        self, rgb: UInt8[np.ndarray, 'h w 3'], run: Run
-    ) -> list[Detection]:
+    def detect(self, rgb: UInt8[np.ndarray, 'h w 3'], run: Run) -> list[Detection]:
         """Return the people of an image; `run` computes the outputs of one input, in order."""
-        ...
-
-
-class Run(Protocol):
-    """One pass of the network."""
-
-    def __call__(self, tensor: Tensor) -> Sequence[Tensor]:
-        """Return the outputs of one input, in the network's order."""
         ...

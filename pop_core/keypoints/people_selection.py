@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 
 from pop_core.body.joints import SHARED_MIRROR
 from pop_core.keypoints.detection import Detection
-from pop_core.keypoints.lifted_joints import LiftedJoints
+from pop_core.keypoints.lifted_joints import LiftedJoints, LiftState
 from pop_core.keypoints.lifting import lift_keypoints
 from pop_core.keypoints.people import detection_of
 from pop_core.keypoints.skeleton import BONE_M, LIMB_ENDS, TORSO, TREE_PARENT
@@ -22,6 +22,7 @@ from pop_core.rgbd import RgbdFrame
 from pop_core.settings import setting
 
 MIN_TORSO, MIN_LIFTED = 2, 4
+MAX_WRONG = 0.4  # share of keypoints that contradict the others
 SAME_PLACE_M = 0.12  # keypoints of one joint seen by two detections of the same person
 SMALLEST, LARGEST = 0.35, 1.4  # median bone relative to the default body's
 
@@ -115,16 +116,19 @@ def _examined(
                     box_px=clean.box_px)
     lifted = lift_keypoints(frame, clean)
     torso = lifted.positions_camera[TORSO][lifted.lifted[TORSO]]
-    if len(torso) < MIN_TORSO or lifted.lifted.sum() < MIN_LIFTED or not _human_size(lifted):
+    if len(torso) < MIN_TORSO or lifted.lifted.sum() < MIN_LIFTED or not _human(lifted):
         return None
     return _Candidate(clean, lifted, np.median(torso, axis=0))
 
 
-def _human_size(lifted: LiftedJoints) -> bool:
+def _human(lifted: LiftedJoints) -> bool:
+    """Return whether joints fit together as a body's, of a person's size."""
+    wrong = np.count_nonzero(lifted.state == LiftState.OUTLIER)
     position = lifted.positions_camera
     ratio = np.linalg.norm(position - position[TREE_PARENT], axis=1) / BONE_M
     known = np.isfinite(ratio)
-    return not known.any() or bool(SMALLEST < np.median(ratio[known]) < LARGEST)
+    sized = not known.any() or SMALLEST < np.median(ratio[known]) < LARGEST
+    return bool(sized and wrong < MAX_WRONG * np.count_nonzero(lifted.scores))
 
 
 def _conflicts(people: Sequence[_Candidate], gap_m: float) -> Bool[np.ndarray, 'n n']:
