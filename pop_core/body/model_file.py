@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from pop_core.body.joints import N_JOINTS
 from pop_core.body.model import BodyModel
 from pop_core.errors import ModelFileError
 
-ARRAY_NAMES = (
-    'v_template', 'shapedirs', 'J_regressor', 'weights', 'parents', 'f', 'fit_vertices',
-    'fit_faces',
-)
+# Axes of each array: v vertices, j joints, p entries of 23 rotations, others free.
+AXES = {
+    'v_template': 'v 3',
+    'shapedirs': 'v 3 b',
+    'posedirs': 'v 3 p',
+    'J_regressor': 'j v',
+    'weights': 'v j',
+    'parents': 'j',
+    'f': 'm 3',
+    'fit_vertices': 'n',
+    'fit_faces': 'k 3',
+}
+INTEGERS = ('parents', 'f', 'fit_vertices', 'fit_faces')
+ARRAY_NAMES = tuple(name for name in AXES if name != 'posedirs')
 # float32 sums of a few hundred terms, and files written with four decimals.
 WEIGHT_SUM_TOLERANCE = 1e-3
 
@@ -47,19 +58,9 @@ def load_body_model(path: Path) -> BodyModel:
             f'{path}: expected the arrays {", ".join(ARRAY_NAMES)}, found no {", ".join(missing)}'
             '; convert SMPL, SMPL-H, SMPL-X and STAR files with `pop body import`'
         )
-    posedirs = arrays.get('posedirs')
-    model = BodyModel(
-        name=str(arrays['name']),
-        v_template=_floats(arrays, 'v_template', path, 'v 3'),
-        shapedirs=_floats(arrays, 'shapedirs', path, 'v 3 b'),
-        posedirs=None if posedirs is None else _floats(arrays, 'posedirs', path, 'v 3 p'),
-        J_regressor=_floats(arrays, 'J_regressor', path, 'j v'),
-        weights=_floats(arrays, 'weights', path, 'v j'),
-        parents=_integers(arrays, 'parents', path, 'j'),
-        f=_integers(arrays, 'f', path, 'm 3'),
-        fit_vertices=_integers(arrays, 'fit_vertices', path, 'n'),
-        fit_faces=_integers(arrays, 'fit_faces', path, 'k 3'),
-    )
+    fields = {name: _checked(arrays, name, path) for name in ARRAY_NAMES}
+    posedirs = _checked(arrays, 'posedirs', path) if 'posedirs' in arrays else None
+    model = BodyModel(name=str(arrays['name']), posedirs=posedirs, **fields)
     check_body_model(model, str(path))
     return model
 
@@ -89,7 +90,7 @@ def save_body_model(path: Path, model: BodyModel, notes: ModelNotes) -> None:
     if model.posedirs is not None:
         arrays['posedirs'] = model.posedirs.astype(half)
     with path.open('wb') as stream:
-        np.savez_compressed(stream, allow_pickle=False, **arrays)
+        np.savez_compressed(stream, **arrays)
 
 
 def check_body_model(model: BodyModel, where: str) -> None:
@@ -133,37 +134,24 @@ def _read_arrays(path: Path) -> dict[str, np.ndarray]:
             return {name: archive[name] for name in archive.files}
     except FileNotFoundError as error:
         raise ModelFileError(f'{path}: expected a body model file, found nothing') from error
-    except (OSError, ValueError, AttributeError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise ModelFileError(
             f'{path}: expected an npz archive of plain arrays, found {error}'
         ) from error
 
 
-def _floats(
-    arrays: dict[str, np.ndarray], name: str, path: Path, axes: str
-) -> Float[np.ndarray, '...']:
-    array = arrays[name]
-    _check_axes(array, f'{path}: expected {name} as numbers', axes, 'fiu')
-    return array.astype(np.float64)
-
-
-def _integers(
-    arrays: dict[str, np.ndarray], name: str, path: Path, axes: str
-) -> Int[np.ndarray, '...']:
-    array = arrays[name]
-    _check_axes(array, f'{path}: expected {name} as integers', axes, 'iu')
-    return array.astype(np.int64)
-
-
-def _check_axes(array: np.ndarray, expected: str, axes: str, kinds: str) -> None:
-    fixed = {'3': 3, 'j': N_JOINTS}
-    letters = axes.split()
-    fits = len(letters) == array.ndim and all(
-        fixed.get(letter, size) == size
-        for letter, size in zip(letters, array.shape, strict=True)
+def _checked(arrays: dict[str, np.ndarray], name: str, path: Path) -> np.ndarray:
+    array, axes = arrays[name], AXES[name].split()
+    vertices = arrays['v_template'].shape[:1]
+    sizes = {'3': 3, 'j': N_JOINTS, 'p': 9 * (N_JOINTS - 1), 'v': math.prod(vertices)}
+    whole = name in INTEGERS
+    shape_fits = len(axes) == array.ndim and array.size > 0 and all(
+        sizes.get(axis, size) == size for axis, size in zip(axes, array.shape, strict=True)
     )
-    if not fits or array.dtype.kind not in kinds:
+    if not shape_fits or array.dtype.kind not in ('iu' if whole else 'fiu'):
+        wanted = ', '.join(str(sizes.get(axis, axis)) for axis in axes)
         raise ModelFileError(
-            f'{expected} of shape ({axes}) with j = {N_JOINTS}, '
-            f'found {array.dtype} of shape {array.shape}'
+            f'{path}: expected {name} as {"integers" if whole else "numbers"} of shape '
+            f'({wanted}), found {array.dtype} of shape {array.shape}'
         )
+    return array.astype(np.int64 if whole else np.float64)

@@ -6,6 +6,7 @@ Loper et al. 2015 (SMPL), Romero et al. 2017 (SMPL-H), Pavlakos et al. 2019 (SMP
 
 from __future__ import annotations
 
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -108,7 +109,7 @@ def _load_npz(path: Path) -> dict[str, Any]:
             # SMPL-X also holds pickled dictionaries: they are not needed and never opened.
             names = [name for name in (*NEEDED, 'posedirs') if name in archive.files]
             return {name: archive[name] for name in names}
-    except (OSError, ValueError, EOFError) as error:
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise ModelFileError(f'{path}: expected an npz of plain arrays, found {error}') from error
 
 

@@ -23,18 +23,21 @@ VIEWER_M = 40.0  # far off: bodies are compared, perspective would favour the ne
 VIEW_FROM_FRONT = np.diag([1.0, -1.0, -1.0])
 
 Pose = Mapping[str, tuple[float, float, float]]
-ARMS_DOWN: Pose = {'left_shoulder': (0, 0, -70), 'right_shoulder': (0, 0, 70)}
+ARMS_DOWN: Pose = {'left_shoulder': (0.0, 0.0, -70.0), 'right_shoulder': (0.0, 0.0, 70.0)}
 # Rotation vectors in degrees: right angles show where skinning pinches.
 POSES: dict[str, Pose] = {
     'arms down': ARMS_DOWN,
-    'elbows 90': {'left_elbow': (0, -90, 0), 'right_elbow': (0, 90, 0)},
-    'arms up': {'left_shoulder': (0, 0, 80), 'right_shoulder': (0, 0, -80)},
-    'knees 90': {'left_knee': (90, 0, 0), 'right_knee': (90, 0, 0)},
+    'elbows 90': {'left_elbow': (0.0, -90.0, 0.0), 'right_elbow': (0.0, 90.0, 0.0)},
+    'arms up': {'left_shoulder': (0.0, 0.0, 80.0), 'right_shoulder': (0.0, 0.0, -80.0)},
+    'knees 90': {'left_knee': (90.0, 0.0, 0.0), 'right_knee': (90.0, 0.0, 0.0)},
     'seated': {
-        **ARMS_DOWN, 'left_hip': (-90, 0, 0), 'right_hip': (-90, 0, 0),
-        'left_knee': (90, 0, 0), 'right_knee': (90, 0, 0),
+        **ARMS_DOWN, 'left_hip': (-90.0, 0.0, 0.0), 'right_hip': (-90.0, 0.0, 0.0),
+        'left_knee': (90.0, 0.0, 0.0), 'right_knee': (90.0, 0.0, 0.0),
     },
-    'bent': {**ARMS_DOWN, 'spine1': (30, 0, 0), 'spine2': (30, 0, 0), 'spine3': (20, 0, 0)},
+    'bent': {
+        **ARMS_DOWN, 'spine1': (30.0, 0.0, 0.0), 'spine2': (30.0, 0.0, 0.0),
+        'spine3': (20.0, 0.0, 0.0),
+    },
 }
 
 
@@ -53,10 +56,10 @@ def draw_body_sheet(model: BodyModel) -> UInt8[np.ndarray, 'h w 3']:
 def _tpose_row(model: BodyModel) -> UInt8[np.ndarray, 'h w 3']:
     rest, thin = model.v_template, model.v_template[model.fit_vertices]
     return _row([
-        captioned(_drawn(rest, model.f, 0, 2.0), 'T-pose'),
-        captioned(_drawn(rest, model.f, 90, 1.0), 'from its right'),
-        captioned(_drawn(rest, model.f, 180, 2.0), 'from behind'),
-        captioned(_drawn(thin, model.fit_faces, 0, 2.0), f'fitting mesh, {len(thin)}'),
+        captioned(_drawn(rest, model.f, 0.0, 2.0), 'T-pose'),
+        captioned(_drawn(rest, model.f, 90.0, 1.0), 'from its right'),
+        captioned(_drawn(rest, model.f, 180.0, 2.0), 'from behind'),
+        captioned(_drawn(thin, model.fit_faces, 0.0, 2.0), f'fitting mesh, {len(thin)}'),
     ])
 
 
@@ -67,7 +70,7 @@ def _beta_row(model: BodyModel, betas: Sequence[int]) -> UInt8[np.ndarray, 'h w 
         for sigma in (-2.0, 2.0):
             shape = np.zeros(model.n_betas)
             shape[beta] = sigma
-            pair.append(_drawn(_posed(model, ARMS_DOWN, shape), model.f, 20, 0.95))
+            pair.append(_drawn(_posed(model, ARMS_DOWN, shape), model.f, 20.0, 0.95))
         panels.append(captioned(_row(pair), f'beta {beta + 1}: -2, +2'))
     return _row(panels)
 
@@ -75,7 +78,7 @@ def _beta_row(model: BodyModel, betas: Sequence[int]) -> UInt8[np.ndarray, 'h w 
 def _pose_row(model: BodyModel) -> UInt8[np.ndarray, 'h w 3']:
     mean = np.zeros(model.n_betas)
     return _row([
-        captioned(_drawn(_posed(model, pose, mean), model.f, 50, 1.25), name)
+        captioned(_drawn(_posed(model, pose, mean), model.f, 50.0, 1.25), name)
         for name, pose in POSES.items()
     ])
 
