@@ -80,7 +80,7 @@ def draw_skeleton(
     for point, state, z in zip(uv, joint_state, joints_camera[:, 2], strict=True):
         if np.isfinite(point).all():
             radius = float(np.clip(AROUND_JOINT_M * camera.fx / z, 2.5, 7.0))
-            filled = state == JointState.VISIBLE
+            filled = bool(state == JointState.VISIBLE)
             _draw_joint(picture, point, radius, width, filled=filled)
 
 

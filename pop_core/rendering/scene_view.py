@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Float, Int, UInt8
 
 from pop_core.geometry.camera import Camera
 from pop_core.rendering.palette import FAINT, INK, PAPER, person_color
@@ -74,8 +74,7 @@ def draw_scene(
         view: Where from.
     """
     picture = np.full((view.camera.height, view.camera.width, 3), PAPER, dtype=np.uint8)
-    nobody = np.ones(frame.depth_m.shape, dtype=bool)
-    _draw_points(picture, frame, nobody, view, bodies)
+    _draw_points(picture, frame, view, bodies)
     farthest_first = sorted(
         enumerate(bodies), key=lambda item: -view.points(item[1].joints)[0, 2])
     for index, body in farthest_first:
@@ -93,12 +92,11 @@ def draw_scene(
 def _draw_points(
     picture: UInt8[np.ndarray, 'h w 3'],
     frame: RgbdFrame,
-    mask: Bool[np.ndarray, 'h w'],
     view: SceneView,
     bodies: Sequence[ShownBody],
 ) -> None:
     """Draw measured points in their own, paled colours, the nearest to the viewer last."""
-    points, uv = point_cloud(frame, mask)
+    points, uv = point_cloud(frame, np.ones(frame.depth_m.shape, dtype=bool))
     along = view.points(points)[:, 2]
     keep = np.ones(len(points), dtype=bool)
     if bodies:
