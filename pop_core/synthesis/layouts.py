@@ -42,8 +42,8 @@ class SceneConfig:
 
     people: tuple[int, int] = (1, 3)
     pose_shares: tuple[tuple[str, float], ...] = (
-        ('standing', 0.3), ('walking', 0.15), ('seated', 0.25), ('reaching', 0.1),
-        ('bending', 0.07), ('crouching', 0.08), ('lying', 0.05))
+        ('standing', 0.2), ('motion', 0.2), ('walking', 0.1), ('seated', 0.22),
+        ('reaching', 0.1), ('bending', 0.06), ('crouching', 0.07), ('lying', 0.05))
     hidden_share: tuple[float, float] = (0.2, 0.6)
     occluders: tuple[int, int] = (1, 2)
     clutter: int = 5

@@ -8,13 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from jaxtyping import Float
 
-from pop_core.body.joints import JOINT_INDEX, MIRROR
-from pop_core.body.model import BodyModel
+from pop_core.body.joint_limits import (
+    LOWER,
+    TWIST_AXES,
+    UPPER,
+    mirrored_pose,
+    pose_coordinates,
+)
+from pop_core.body.joints import JOINT_INDEX
+from pop_core.body.kinematics import joints
+from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.geometry.rotation import from_rotvec, to_rotvec
+from pop_core.geometry.swing_twist import from_swing_twist
+from pop_core.retrieval.pose_prior import PosePrior, load_pose_prior
 from pop_core.synthesis.pose_parts import (
     arm_in_style,
     bend_spine,
@@ -26,7 +37,9 @@ from pop_core.synthesis.pose_parts import (
     standing_base,
 )
 
-POSE_KINDS = ('standing', 'walking', 'seated', 'lying', 'reaching', 'bending', 'crouching')
+POSE_KINDS = ('standing', 'walking', 'seated', 'lying', 'reaching', 'bending', 'crouching',
+              'motion')
+MAX_TILT_RAD = 0.8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,8 +71,27 @@ def draw_pose(model: BodyModel, kind: str, rng: np.random.Generator) -> ScenePos
 
 def mirrored(pose: ScenePose) -> ScenePose:
     """Return the pose of the mirror image, left for right."""
-    swapped = pose.body_pose[MIRROR[1:] - 1] * np.array([1.0, -1.0, -1.0])
-    return ScenePose(pose.kind, swapped, pose.tilt * np.array([1.0, -1.0, -1.0]))
+    tilt = pose.tilt * np.array([1.0, -1.0, -1.0])
+    return ScenePose(pose.kind, mirrored_pose(pose.body_pose), tilt)
+
+
+def balancing_tilt(
+    model: BodyModel, body_pose: Float[np.ndarray, '23 3']
+) -> Float[np.ndarray, '3']:
+    """Return the turn of the pelvis [rad] that brings the trunk above the lower foot.
+
+    Mocap statistics are kept without the pelvis; who stands, stands over the feet.
+    """
+    p = joints(model, BodyParameters(
+        np.zeros(3), np.zeros(3), body_pose, np.zeros(model.n_betas)))
+    feet = p[[JOINT_INDEX['left_ankle'], JOINT_INDEX['right_ankle']]]
+    share = 1.0 / (1.0 + np.exp(-20.0 * (feet[1, 1] - feet[0, 1])))  # of the left foot
+    lean = p[[0, JOINT_INDEX['spine3']]].mean(axis=0) - share * feet[0] - (1 - share) * feet[1]
+    lean = lean / np.linalg.norm(lean)
+    axis = np.cross(lean, [0.0, 1.0, 0.0])
+    sine = float(np.linalg.norm(axis))
+    angle = min(float(np.arctan2(sine, lean[1])), MAX_TILT_RAD)
+    return axis / max(sine, 1e-9) * angle
 
 
 def walking_pose(
@@ -147,6 +179,17 @@ def _draw_reaching(model: BodyModel, rng: np.random.Generator) -> ScenePose:
     return ScenePose('reaching', pose, np.array([rng.uniform(-0.05, 0.15), 0.0, 0.0]))
 
 
+def _draw_motion(model: BodyModel, rng: np.random.Generator) -> ScenePose:
+    drawn = _motion_prior().sample(rng, 1)[0]
+    pose = from_swing_twist(np.clip(pose_coordinates(drawn), LOWER, UPPER), TWIST_AXES)
+    return ScenePose('motion', pose, balancing_tilt(model, pose))
+
+
+@cache
+def _motion_prior() -> PosePrior:
+    return load_pose_prior().motion_part()
+
+
 def _draw_bending(model: BodyModel, rng: np.random.Generator) -> ScenePose:
     pose = standing_base(model, rng.uniform([0.02, -0.05], [0.2, 0.05]))
     tilt = rng.uniform(0.3, 1.0)
@@ -178,7 +221,7 @@ def _draw_crouching(model: BodyModel, rng: np.random.Generator) -> ScenePose:
 _DRAWS: dict[str, Callable[[BodyModel, np.random.Generator], ScenePose]] = {
     'standing': _draw_standing, 'walking': _draw_walking, 'seated': _draw_seated,
     'lying': _draw_lying, 'reaching': _draw_reaching, 'bending': _draw_bending,
-    'crouching': _draw_crouching,
+    'crouching': _draw_crouching, 'motion': _draw_motion,
 }
 _STANDING_ARMS = ['hang', 'hip', 'folded', 'forward', 'face', 'up', 'out']
 _STANDING_ARM_SHARES = [0.42, 0.12, 0.12, 0.14, 0.1, 0.05, 0.05]

@@ -6,7 +6,13 @@ from pop_core.body.kinematics import joints
 from pop_core.body.model import BodyParameters
 from pop_core.synthesis.arms import reach
 from pop_core.synthesis.pose_parts import limbs_clear
-from pop_core.synthesis.poses import POSE_KINDS, draw_pose, mirrored, walking_pose
+from pop_core.synthesis.poses import (
+    POSE_KINDS,
+    balancing_tilt,
+    draw_pose,
+    mirrored,
+    walking_pose,
+)
 
 
 def posed_joints(model, body_pose):
@@ -69,3 +75,19 @@ def test_half_a_walking_cycle_later_the_other_leg_is_in_front(model):
         lead_later = later[JOINT_INDEX['left_ankle'], 2] - later[JOINT_INDEX['right_ankle'], 2]
         assert lead == pytest.approx(-lead_later, abs=0.01)
         assert abs(lead) > 0.05
+
+
+def test_who_stands_by_the_balancing_tilt_has_the_trunk_above_the_lower_foot(model):
+    pose = walking_pose(model, 0.8)
+    pose[JOINT_INDEX['left_hip'] - 1] = [-1.2, 0.0, 0.0]  # one foot lifted: the other carries
+    leaning = np.array([0.35, 0.0, 0.1])
+    tilt = balancing_tilt(model, pose)
+    p = joints(model, BodyParameters(np.zeros(3), tilt, pose, np.zeros(10)))
+    before = joints(model, BodyParameters(np.zeros(3), leaning, pose, np.zeros(10)))
+
+    def offset(points):
+        trunk = points[[0, JOINT_INDEX['spine3']]].mean(axis=0)
+        return np.linalg.norm((trunk - points[JOINT_INDEX['right_ankle']])[[0, 2]])
+
+    assert offset(p) < 0.03
+    assert offset(before) > 0.1
