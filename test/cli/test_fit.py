@@ -14,6 +14,7 @@ from pop_core.body.default_body import default_body
 from pop_core.body.kinematics import joints
 from pop_core.body.model import BodyParameters
 from pop_core.body.skinning import vertices
+from pop_core.errors import PopError
 from pop_ros.cli import build_app
 from pop_ros.result_folder import status_sentence
 from pop_ros.warm_up import PLACE
@@ -152,12 +153,18 @@ def test_an_output_that_is_a_file_is_a_bad_input_not_a_crash(tmp_path, scene):
     ],
     ids=['network', 'flag', 'type', 'range', 'name'],
 )
-def test_a_bad_option_ends_in_one_line_and_code_2(tmp_path, scene, arguments, sentence):
+def test_a_bad_option_is_refused_by_name(tmp_path, scene, arguments, sentence):
     frame = write_frame(tmp_path / 'frame', scene[0], [])
-    command = [sys.executable, '-m', 'pop_ros.cli', 'fit', frame, '--out', tmp_path / 'out']
-    result = subprocess.run([*command, *arguments], capture_output=True, text=True, check=False)
+    result = fit(frame, '--out', tmp_path / 'out', *arguments)
+    assert isinstance(result.exception, PopError)
+    assert sentence in str(result.exception)
+
+
+def test_a_refused_option_ends_in_one_line_and_code_2(tmp_path):
+    command = [sys.executable, '-m', 'pop_ros.cli', 'fit', tmp_path, '--out', tmp_path / 'out']
+    result = subprocess.run(
+        [*command, '--set', 'no.such=1'], capture_output=True, text=True, check=False)
     assert result.returncode == 2
-    assert sentence in result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
 
 
