@@ -10,7 +10,7 @@ from pop_core.retrieval.candidate import PoseCandidate
 
 
 def initial_parameters(model: BodyModel, candidate: PoseCandidate) -> BodyParameters:
-    """Return the mean body in a candidate's pose, scaled and placed as Eq. (1) says.
+    """Return the mean body in a candidate's pose, scaled and placed by Eq. (1) (step 5).
 
     The similarity puts the candidate's pelvis at a known point; the root joint of the body goes
     there.

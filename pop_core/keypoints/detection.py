@@ -44,7 +44,7 @@ class Detection:
 
 @runtime_checkable  # so that tests can check arguments of this type
 class KeypointDetector(Protocol):
-    """Anything that finds people in a frame."""
+    """Anything that finds people in a frame (step 2: J_2D)."""
 
     def detect(self, frame: RgbdFrame) -> list[Detection]:
         """Return the people of a frame, best first; an empty list when there are none."""

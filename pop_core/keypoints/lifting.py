@@ -62,7 +62,7 @@ class LiftingConfig:
 def lift_keypoints(
     frame: RgbdFrame, detection: Detection, config: LiftingConfig | None = None
 ) -> LiftedJoints:
-    """Return each keypoint as a joint in 3D, or the reason why it has no position.
+    """Return each keypoint as a joint in 3D, or the reason why it has none (step 3: J_3D).
 
     Depth reads skin; the joint lies some centimetres further along the ray. Surfaces that the
     skeleton cannot reach are occluders (nearer) or background (farther), and are never lifted

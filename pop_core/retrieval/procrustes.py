@@ -43,7 +43,7 @@ def solve_similarities(
     *,
     yaw_only: bool = False,
 ) -> Similarities:
-    """Return the weighted similarity that maps each set of points onto the target.
+    """Return the weighted similarity that maps each set of points onto the target (Eq. 1).
 
     R maximises trace(R^T C) of the cross-covariance C by its singular vectors, the last one turned
     where a reflection would win (Horn 1987; Umeyama 1991); the scale follows and is clamped, which

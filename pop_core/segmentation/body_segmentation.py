@@ -36,7 +36,7 @@ def segment_body(
     focal_px: float,
     config: SegmentationConfig,
 ) -> Bool[np.ndarray, 'h w']:
-    """Return the pixels that show the person: the mask of the paper's clean depth and of H.
+    """Return the pixels that show the person: the mask of clean depth and of H (step 6).
 
     The rendered body is a mask; pixels around it join when their depth is within gamma of a
     neighbour already inside. Growth stays within `growth_m` of the silhouette and `tolerance_m`
