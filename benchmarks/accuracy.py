@@ -34,7 +34,7 @@ from pop_core.pipeline import BodyPipeline
 from pop_core.retrieval.default_library import default_library
 from pop_core.retrieval.pose_library import PoseLibrary
 from pop_core.settings import Value, apply_settings, list_settings
-from pop_core.synthesis.layouts import SceneConfig
+from pop_core.synthesis.scene_config import SceneConfig
 from pop_core.synthesis.scenes import SyntheticScene, synthesise_scene
 
 FIRST_SEED = 10_000  # far from the seeds of tests and training

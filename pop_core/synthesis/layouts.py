@@ -3,54 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 from scipy.spatial import cKDTree
 
 from pop_core.body.kinematics import joints
 from pop_core.body.model import BodyModel
 from pop_core.geometry.camera import Camera
 from pop_core.geometry.transform import invert_transform
-from pop_core.synthesis.blocks import Block, block_surface, depth_inside, moved
-from pop_core.synthesis.cameras import CameraRange, draw_camera
-from pop_core.synthesis.occluders import OCCLUDERS
+from pop_core.synthesis.blocks import Block, depth_inside
+from pop_core.synthesis.cameras import draw_camera
+from pop_core.synthesis.occlusion import draw_occluders, is_free
 from pop_core.synthesis.people import Actor, actor_at, draw_actor
+from pop_core.synthesis.props import draw_prop
 from pop_core.synthesis.rooms import Room, draw_clutter, draw_room
-from pop_core.synthesis.shading import joined
+from pop_core.synthesis.scene_config import SceneConfig
 
 PEOPLE_GAP_M = 0.06
-CAMERA_GAP_M = 0.35
-
-
-@dataclass(frozen=True, slots=True)
-class SceneConfig:
-    """What scenes are drawn from.
-
-    Args:
-        people: Fewest and most people.
-        pose_shares: Kind of pose and its share.
-        hidden_share: Lowest and highest share of hidden joints of the most hidden person.
-        occluders: Fewest and most things put between camera and people.
-        clutter: Most things along the walls.
-        child_share: Share of children.
-        bare_share: Share of people without clothes, whose T-pose can be compared with truth.
-        sensors: Presets of sensor noise, one drawn per scene; empty leaves depth perfect.
-        cameras: What cameras are drawn from.
-    """
-
-    people: tuple[int, int] = (1, 3)
-    pose_shares: tuple[tuple[str, float], ...] = (
-        ('standing', 0.2), ('motion', 0.2), ('walking', 0.1), ('seated', 0.22),
-        ('reaching', 0.1), ('bending', 0.06), ('crouching', 0.07), ('lying', 0.05))
-    hidden_share: tuple[float, float] = (0.2, 0.6)
-    occluders: tuple[int, int] = (1, 2)
-    clutter: int = 5
-    child_share: float = 0.1
-    bare_share: float = 0.25
-    sensors: tuple[str, ...] = ('structured_light', 'stereo', 'time_of_flight')
-    cameras: CameraRange = field(default_factory=CameraRange)
+WALL_GAP_M = 0.15
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,33 +59,16 @@ def draw_layout(
     eye = invert_transform(T_camera_room)[:3, 3]
     clutter = draw_clutter(room, rng, int(rng.integers(0, config.clutter + 1)))
     fixed = clutter + tuple(block for actor in actors for block in actor.seat)
-    if not _free(clutter, actors, eye) or _too_near(actors, eye):
+    if not (_in_room(room, eye) and is_free(clutter, actors, eye)) or _too_near(actors, eye):
         return None
-    occluders = _draw_occluders(model, actors, eye, config, rng)
+    occluders = draw_occluders(model, actors, eye, config, rng)
     if occluders is None:
         return None
+    carried = tuple(
+        draw_prop(model, actor.parameters, rng)
+        for actor in actors if rng.random() < config.prop_share)
     light = np.array([rng.uniform(-1.5, 1.5), room.height_m - 0.2, rng.uniform(0.0, 2.5)])
-    return Layout(room, actors, fixed + occluders, camera, T_camera_room, light)
-
-
-def hidden_from(
-    eye: Float[np.ndarray, '3'], p_room: Float[np.ndarray, 'n 3'],
-    vertices: Float[np.ndarray, 'v 3'], faces: Int[np.ndarray, 'm 3'],
-) -> Bool[np.ndarray, 'n']:
-    """Return which points a set of triangles hides from an eye (Moeller and Trumbore 1997)."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    e1, e2, s = b - a, c - a, eye - a
-    q = np.cross(s, e1)
-    hidden = np.zeros(len(p_room), dtype=bool)
-    for i, ray in enumerate(p_room - eye):
-        h = np.cross(ray, e2)
-        determinant = (e1 * h).sum(axis=1)
-        with np.errstate(divide='ignore', invalid='ignore'):
-            u = (s * h).sum(axis=1) / determinant
-            v = (q @ ray) / determinant
-            t = (e2 * q).sum(axis=1) / determinant
-        hidden[i] = bool(np.any((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < 1)))
-    return hidden
+    return Layout(room, actors, fixed + occluders + carried, camera, T_camera_room, light)
 
 
 def _draw_people(
@@ -157,80 +112,9 @@ def _apart(first: Actor, second: Actor) -> bool:
     return bool(near.min() > PEOPLE_GAP_M and not in_seat and not in_other)
 
 
-def _draw_occluders(
-    model: BodyModel, actors: Sequence[Actor], eye: Float[np.ndarray, '3'], config: SceneConfig,
-    rng: np.random.Generator,
-) -> tuple[Block, ...] | None:
-    """Return furniture that hides the wanted share of some person's joints, or None."""
-    if not actors:
-        return ()
-    low, high = config.hidden_share
-    for _ in range(25):
-        blocks: tuple[Block, ...] = ()
-        for _ in range(rng.integers(config.occluders[0], config.occluders[1] + 1)):
-            thing = _before(actors[int(rng.integers(len(actors)))], eye, rng)
-            blocks = blocks if _touch(blocks, thing) else blocks + thing
-        if not _free(blocks, actors, eye):
-            continue
-        shares = _hidden_shares(model, actors, blocks, eye)
-        # The body itself hides joints too: leave room for them below the upper bound.
-        if max(shares) <= high and (low == 0 or max(shares) >= 0.6 * low):
-            return blocks
-    return None
-
-
-def _before(
-    victim: Actor, eye: Float[np.ndarray, '3'], rng: np.random.Generator
-) -> tuple[Block, ...]:
-    """Return a piece of furniture on the floor between the eye and a person."""
-    thing = OCCLUDERS[rng.integers(len(OCCLUDERS))](rng)
-    middle = victim.skin.mean(axis=0)
-    share = rng.uniform(0.12, 0.55)
-    place = middle + share * (eye - middle) + np.array([rng.normal(0, 0.3), 0.0, 0.0])
-    place[1] = 0.0
-    toward = eye - middle
-    yaw = np.arctan2(toward[0], toward[2]) + rng.normal(0, 0.3)
-    if rng.random() < 0.3:
-        yaw += np.pi
-    return moved(thing, place, float(yaw))
-
-
-def _touch(first: Sequence[Block], second: Sequence[Block]) -> bool:
-    """Return whether two pieces of furniture run into each other."""
-    pairs = ((first, second), (second, first))
-    return any(
-        depth_inside(block, block_surface(other).vertices).max() > 0
-        for these, those in pairs for block in these for other in those)
-
-
-def _hidden_shares(
-    model: BodyModel, actors: Sequence[Actor], blocks: Sequence[Block],
-    eye: Float[np.ndarray, '3'],
-) -> list[float]:
-    """Return per person the share of joints that furniture or other people hide."""
-    things = joined([block_surface(block) for block in blocks]) if blocks else None
-    shares = []
-    for k, actor in enumerate(actors):
-        p = joints(model, actor.parameters)
-        hidden = np.zeros(len(p), dtype=bool)
-        if things is not None:
-            hidden |= hidden_from(eye, p, things.vertices, things.faces)
-        for other in (*actors[:k], *actors[k + 1:]):
-            hidden |= hidden_from(eye, p, other.skin[model.fit_vertices], model.fit_faces)
-        shares.append(float(hidden.mean()))
-    return shares
-
-
-def _free(
-    blocks: Sequence[Block], actors: Sequence[Actor], eye: Float[np.ndarray, '3']
-) -> bool:
-    """Return whether blocks keep clear of people and of the camera."""
-    for block in blocks:
-        if depth_inside(block, eye[None])[0] > -CAMERA_GAP_M:
-            return False
-        if any(depth_inside(block, actor.surface).max() > -0.005 for actor in actors):
-            return False
-    return True
+def _in_room(room: Room, eye: Float[np.ndarray, '3']) -> bool:
+    beside = abs(eye[0]) < room.half_width_m - WALL_GAP_M
+    return bool(beside and eye[1] < room.height_m - WALL_GAP_M and eye[2] < room.front_m)
 
 
 def _too_near(actors: Sequence[Actor], eye: Float[np.ndarray, '3']) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int8, UInt8
+from jaxtyping import Bool, Float, Float32, Int8
 
 from pop_core.body.model import BodyModel
 from pop_core.errors import PopError
@@ -16,14 +16,14 @@ from pop_core.rendering.depth_renderer import RenderedDepth
 from pop_core.rgbd import RgbdFrame
 from pop_core.synthesis.blocks import Surface, Texture
 from pop_core.synthesis.keypoints import KeypointNoise, noisy_detection
-from pop_core.synthesis.layouts import Layout, SceneConfig, draw_layout
+from pop_core.synthesis.layouts import Layout, draw_layout
+from pop_core.synthesis.scene_config import SceneConfig
 from pop_core.synthesis.sensor_noise import SENSORS
 from pop_core.synthesis.shading import Stage, joined, shade
 from pop_core.synthesis.truth import PersonTruth, RenderedTruth, render_truth
 
 ATTEMPTS = 200
-DARK_BRIGHTNESS = 60  # mean colour below which active light comes back weak
-MIN_VISIBLE = 5
+DARK_ALBEDO = 0.12  # reflectance below which active light comes back weak
 
 
 class SceneError(PopError):
@@ -79,23 +79,26 @@ def synthesise_scene(
         truth = render_truth(model, layout)
         if _acceptable(truth.people, chosen):
             sensor = str(rng.choice(chosen.sensors)) if chosen.sensors else ''
-            return photograph(model, layout, truth, sensor=sensor, seed=seed)
+            return photograph(
+                model, layout, truth, sensor=sensor, seed=seed, colour=chosen.colour)
     raise SceneError(f'seed {seed}: expected a scene within {chosen}, found none in {ATTEMPTS}')
 
 
 def photograph(
     model: BodyModel, layout: Layout, truth: RenderedTruth, *, sensor: str, seed: int,
-    stamp_ns: int | None = None,
+    stamp_ns: int | None = None, colour: bool = True,
 ) -> SyntheticScene:
-    """Return the scene as a sensor sees it: colours, and depth with the sensor's noise."""
+    """Return the scene as a sensor sees it: depth with its noise, colours where asked for."""
     rng = np.random.default_rng([seed, 2])
     stage, rendered = _whole_stage(model, layout, truth)
-    rgb = shade(
-        stage, rendered, layout.camera, T_room_camera=invert_transform(layout.T_camera_room),
-        light_room=layout.light_room, rng=rng)
+    rgb = np.zeros((*rendered.face.shape, 3), dtype=np.uint8)
+    if colour:
+        rgb = shade(
+            stage, rendered, layout.camera, light_room=layout.light_room, rng=rng,
+            T_room_camera=invert_transform(layout.T_camera_room))
     depth_m = np.where(np.isfinite(truth.depth_m), truth.depth_m, np.nan).astype(np.float32)
     if sensor:
-        dark = _dark(rgb, truth.owner)
+        dark = _dark(stage, rendered, truth.owner)
         depth_m = SENSORS[sensor](truth.depth_m, layout.camera, dark, rng)
     stamp = (1_000_000 + seed) * 1_000_000 if stamp_ns is None else stamp_ns
     frame = RgbdFrame(rgb, depth_m, layout.camera, stamp)
@@ -105,11 +108,12 @@ def photograph(
 
 def _acceptable(people: tuple[PersonTruth, ...], config: SceneConfig) -> bool:
     """Return whether every person can be found and the most hidden one is hidden as wanted."""
-    enough = all((p.shared_state == JointState.VISIBLE).sum() >= MIN_VISIBLE for p in people)
     if not people:
         return True
+    fewest = min((p.shared_state == JointState.VISIBLE).sum() for p in people)
     hidden = max(p.hidden_share for p in people)
-    return enough and config.hidden_share[0] <= hidden <= config.hidden_share[1]
+    low, high = config.hidden_share
+    return bool(fewest >= config.fewest_visible and low <= hidden <= high)
 
 
 def _whole_stage(
@@ -131,7 +135,8 @@ def _whole_stage(
 
 
 def _dark(
-    rgb: UInt8[np.ndarray, 'h w 3'], owner: Int8[np.ndarray, 'h w']
+    stage: Stage, rendered: RenderedDepth, owner: Int8[np.ndarray, 'h w']
 ) -> Bool[np.ndarray, 'h w']:
     """Return pixels of people whose cloth or hair returns little light."""
-    return (rgb.mean(axis=2) < DARK_BRIGHTNESS) & (owner >= 0)
+    albedo = stage.albedo[stage.faces].mean(axis=(1, 2))
+    return (albedo < DARK_ALBEDO)[rendered.face] & (owner >= 0)

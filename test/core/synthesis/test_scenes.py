@@ -5,7 +5,8 @@ from pop_core.body.kinematics import joints
 from pop_core.body.skinning import vertices
 from pop_core.estimate import JointState
 from pop_core.rendering.depth_renderer import render_depth
-from pop_core.synthesis.layouts import SceneConfig
+from pop_core.synthesis import scenes as scenes_module
+from pop_core.synthesis.scene_config import SceneConfig
 from pop_core.synthesis.scenes import SceneError, synthesise_scene
 
 
@@ -90,7 +91,8 @@ def test_an_empty_room_can_be_asked_for(model):
     assert np.isfinite(scene.frame.depth_m).mean() > 0.5
 
 
-def test_an_impossible_configuration_is_told(model):
+def test_an_impossible_configuration_is_told(model, monkeypatch):
+    monkeypatch.setattr(scenes_module, 'ATTEMPTS', 2)
     config = SceneConfig(people=(1, 1), occluders=(0, 0), hidden_share=(0.97, 1.0))
     with pytest.raises(SceneError, match='seed 0'):
         synthesise_scene(model, 0, config)
