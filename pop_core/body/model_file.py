@@ -28,6 +28,7 @@ AXES = {
 }
 INTEGERS = ('parents', 'f', 'fit_vertices', 'fit_faces')
 ARRAY_NAMES = tuple(name for name in AXES if name != 'posedirs')
+IMPORT_HINT = 'convert SMPL, SMPL-H, SMPL-X and STAR files with `pop body import`'
 # float32 sums of a few hundred terms, and files written with four decimals.
 WEIGHT_SUM_TOLERANCE = 1e-3
 
@@ -56,7 +57,7 @@ def load_body_model(path: Path) -> BodyModel:
     if missing:
         raise ModelFileError(
             f'{path}: expected the arrays {", ".join(ARRAY_NAMES)}, found no {", ".join(missing)}'
-            '; convert SMPL, SMPL-H, SMPL-X and STAR files with `pop body import`'
+            f'; {IMPORT_HINT}'
         )
     fields = {name: _checked(arrays, name, path) for name in ARRAY_NAMES}
     posedirs = _checked(arrays, 'posedirs', path) if 'posedirs' in arrays else None
@@ -136,7 +137,7 @@ def _read_arrays(path: Path) -> dict[str, np.ndarray]:
         raise ModelFileError(f'{path}: expected a body model file, found nothing') from error
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise ModelFileError(
-            f'{path}: expected an npz archive of plain arrays, found {error}'
+            f'{path}: expected an npz archive of plain arrays, found {error}; {IMPORT_HINT}'
         ) from error
 
 

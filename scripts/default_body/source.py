@@ -48,7 +48,6 @@ class People:
 
     half_vertices: np.ndarray  # (p, n, 3) [m]
     bone_heads: dict[str, np.ndarray]  # (p, 3) each [m]
-    age_years: np.ndarray  # (p,)
 
 
 def load_source() -> Source:
@@ -69,7 +68,7 @@ def sample_people(source: Source, years: tuple[float, float], count: int, seed: 
     """Draw people of Anny's WHO-calibrated shape distribution, ages uniform between `years`."""
     torch.manual_seed(seed)
     ages = torch.distributions.Uniform(*(torch.tensor(y, dtype=torch.float64) for y in years))
-    drawn, phenotype = SimpleShapeDistribution(source.model, ages).sample(count)
+    _, phenotype = SimpleShapeDistribution(source.model, ages).sample(count)
     halves, heads = [], []
     for start in range(0, count, 100):
         chunk = {name: values[start : start + 100] for name, values in phenotype.items()}
@@ -81,7 +80,7 @@ def sample_people(source: Source, years: tuple[float, float], count: int, seed: 
     names = source.model.bone_labels
     stacked = np.concatenate(heads)
     bone_heads = {name: stacked[:, index] for index, name in enumerate(names)}
-    return People(np.concatenate(halves), bone_heads, drawn.numpy())
+    return People(np.concatenate(halves), bone_heads)
 
 
 def _rest(model: anny.Anny, phenotype: dict[str, torch.Tensor]) -> tuple[np.ndarray, np.ndarray]:
