@@ -54,5 +54,6 @@ $(VENV)/.tools: setup.py constraints.txt | $(BIN)/python
 
 # Not editable: an editable install leaves out what ROS looks for below share/.
 $(VENV)/.installed: $(VENV)/.tools $(SOURCES)
+	rm -rf build  # modules deleted since the last build would come along
 	$(PIP) install --quiet --no-deps --no-build-isolation --force-reinstall .
 	touch $@
