@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
-from pop_ros.explanation import TopicReport
-from pop_ros.pairing import PairStatistics
+from pop_ros.explanation import TopicReport, explain_refused_pairs
+from pop_ros.pairing import FramePairer
 from pop_ros.statistics import Snapshot
 
 DROP_PREFIX = 'dropped: '
+RECEIVED = 'received '
 MISSED = 'colour images without depth'
+WHY_MISSED = 'why without depth'
 MANY_DROPS = 0.5  # share of dropped pairs since the last report that deserves a warning
 
 
@@ -23,7 +26,7 @@ def diagnostic_array(
     snapshot: Snapshot,
     *,
     previous: Snapshot | None,
-    pairs: PairStatistics,
+    pairer: FramePairer[Any],
     reports: Sequence[TopicReport],
     trouble: str,
 ) -> DiagnosticArray:
@@ -34,12 +37,12 @@ def diagnostic_array(
         name: Name of the status.
         snapshot: Counts now.
         previous: Counts at the report before, for the shares since then.
-        pairs: Counts of the pairer.
+        pairer: Pairer of the inputs, for its counts.
         reports: State of the inputs.
         trouble: What keeps the node from working, or ''.
     """
     level, message = _judge(snapshot, previous, trouble)
-    values = [KeyValue(key=key, value=value) for key, value in _values(snapshot, pairs, reports)]
+    values = [KeyValue(key=key, value=value) for key, value in _values(snapshot, pairer, reports)]
     status = DiagnosticStatus(
         level=level, name=name, hardware_id='pop', message=message, values=values)
     return DiagnosticArray(header=header, status=[status])
@@ -72,13 +75,16 @@ def _judge(now: Snapshot, before: Snapshot | None, trouble: str) -> tuple[bytes,
 
 
 def _values(
-    now: Snapshot, pairs: PairStatistics, reports: Sequence[TopicReport]
+    now: Snapshot, pairer: FramePairer[Any], reports: Sequence[TopicReport]
 ) -> Iterable[tuple[str, str]]:
+    pairs = pairer.statistics
     yield 'pairs', str(now.pairs)
     yield 'frames', str(now.frames)
     yield 'pending', str(now.pending)
     yield 'people', str(now.people)
     yield MISSED, str(pairs.missed)
+    if pairs.missed:
+        yield WHY_MISSED, explain_refused_pairs(pairer)
     if pairs.skews_ns:
         skew_ms = np.abs(np.array(pairs.skews_ns)) / 1e6
         yield 'pair skew', percentiles(skew_ms.tolist())
@@ -89,4 +95,5 @@ def _values(
     for step, values_ms in now.step_ms.items():
         yield f'step {step}', percentiles(values_ms)
     for report in reports:
+        yield f'{RECEIVED}{report.role}', str(report.count)
         yield report.role, report.text()

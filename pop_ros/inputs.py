@@ -89,7 +89,8 @@ class InputTopic:
     def _same_type(self) -> tuple[str, ...]:
         name = f'{self._kind.__module__.split(".")[0]}/msg/{self._kind.__name__}'
         known = self._node.get_topic_names_and_types()
-        same = [topic for topic, types in known if name in types and topic != self.topic]
+        same = [topic for topic, types in known
+                if name in types and self._node.count_publishers(topic)]
         wants_depth = 'depth' in self.role
         return tuple(sorted(same, key=lambda topic: ('depth' in topic) != wants_depth))
 
@@ -123,9 +124,10 @@ class RgbdInputs:
             topic.follow(reliability)
 
     def leave(self) -> None:
-        """Unsubscribe everything and forget pending images."""
+        """Unsubscribe everything; what comes next may be another camera."""
         for topic in self.topics:
             topic.leave()
+        self._info = None
         self.reset(self.pairer.slop_ns / 1e9)
 
     def reset(self, slop_s: float) -> None:

@@ -38,7 +38,7 @@ from pop_ros.node_config import NodeConfig
 from pop_ros.parameters import ConfigParameters
 from pop_ros.pop_messages import model_message, pop_msgs
 from pop_ros.qos import output_qos
-from pop_ros.statistics import NodeStatistics, Snapshot
+from pop_ros.statistics import NodeStatistics, Snapshot, drop_reason
 from pop_ros.to_messages import make_header
 from pop_ros.worker import Worker
 
@@ -67,7 +67,7 @@ class PopNode(Node):
         self._arguments = arguments
         self._changed = threading.Event()
         self._settings = ConfigParameters(
-            self, NodeConfig(), PipelineConfig(), self._changed.set)
+            self, NodeConfig(), PipelineConfig(), self._on_settings)
         self._statistics = NodeStatistics()
         self._previous: Snapshot | None = None
         self._trouble = ''
@@ -98,6 +98,11 @@ class PopNode(Node):
         return self._settings.node_config
 
     # Executor thread
+
+    def _on_settings(self) -> None:
+        self._changed.set()
+        if round(self._config.sync.slop_s * 1e9) != self._inputs.pairer.slop_ns:
+            self._inputs.reset(self._config.sync.slop_s)
 
     def _follow(self) -> None:
         """Subscribe while the worker is ready and somebody listens."""
@@ -134,7 +139,7 @@ class PopNode(Node):
         self._diagnostics.publish(diagnostic_array(
             make_header(self.get_clock().now().nanoseconds, ''),
             self.get_fully_qualified_name(), snapshot, previous=self._previous,
-            pairs=self._inputs.pairer.statistics, reports=reports, trouble=trouble))
+            pairer=self._inputs.pairer, reports=reports, trouble=trouble))
         self._previous = snapshot
 
     # Worker thread
@@ -184,7 +189,7 @@ class PopNode(Node):
         if self._fitter is None:
             self.failure = error
             return
-        reason = type(error).__name__
+        reason = drop_reason(error)
         if self._statistics.add_drop(reason, str(error)):
             say = self.log.warning if isinstance(error, PopError) else self.log.error
             say(f'frame dropped ({reason}): {error}')

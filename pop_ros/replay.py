@@ -14,11 +14,12 @@ from pop_ros.bag_reader import BagMessage, BagReader
 from pop_ros.bag_topics import RgbdTopics
 from pop_ros.bag_writer import BagWriter
 from pop_ros.body_messages import OUTPUT_TYPES
-from pop_ros.diagnostics import percentiles
+from pop_ros.diagnostics import MISSED, percentiles
 from pop_ros.explanation import explain_refused_pairs
 from pop_ros.frame_fitter import FrameFitter
 from pop_ros.from_messages import stamp_ns
 from pop_ros.pairing import FramePairer
+from pop_ros.statistics import drop_reason
 
 OUTPUT_NAMESPACE = '/pop'
 KINDS = {name: f'{kind.__module__.split(".")[0]}/msg/{kind.__name__}'
@@ -47,6 +48,13 @@ class ReplaySummary:
     latency_ms: list[float] = field(default_factory=list)
     latency_text: str = ''
     notes: list[str] = field(default_factory=list)
+
+    def add_drop(self, error: PopError) -> None:
+        """Count a pair that gave no frame; the first of its kind is told in full."""
+        reason = drop_reason(error)
+        self.drops[reason] += 1
+        if self.drops[reason] == 1:
+            self.notes.append(f'{reason}: {error}')
 
     def text(self) -> str:
         """Return the summary in lines."""
@@ -127,7 +135,7 @@ def replay_every_frame(
         try:
             _fit_and_write(frame, fitter, writer, summary)
         except PopError as error:
-            summary.drops[f'{error}'] += 1
+            summary.add_drop(error)
         else:
             summary.frames += 1
             summary.latency_ms.append((time.perf_counter() - started_s) * 1e3)
@@ -140,7 +148,7 @@ def notes(bag: BagReader, pairer: FramePairer[BagMessage]) -> list[str]:
     found = []
     if pairer.statistics.missed:
         found.append(
-            f'{pairer.statistics.missed} colour images without depth: '
+            f'{pairer.statistics.missed} {MISSED}: '
             f'{explain_refused_pairs(pairer)}')
     if bag.damage:
         found.append(f'the bag is damaged ({bag.damage}); what could be read was processed')

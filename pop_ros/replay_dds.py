@@ -7,6 +7,7 @@ import struct
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable
 from types import TracebackType
 from typing import Any
@@ -24,7 +25,7 @@ from pop_ros.bag_reader import BagReader
 from pop_ros.bag_topics import RgbdTopics
 from pop_ros.bag_writer import BagWriter
 from pop_ros.body_messages import OUTPUT_TYPES
-from pop_ros.diagnostics import DROP_PREFIX, MISSED, read_values
+from pop_ros.diagnostics import DROP_PREFIX, MISSED, RECEIVED, WHY_MISSED, read_values
 from pop_ros.inputs import COLOR, DEPTH, INFO
 from pop_ros.node_arguments import SourceArguments
 from pop_ros.qos import output_qos
@@ -32,7 +33,8 @@ from pop_ros.replay import KINDS, OUTPUT_NAMESPACE, ReplaySummary, announce_outp
 
 READY_S = 900.0  # a first start generates the pose library
 IDLE_S = 300.0  # the frame in work and the one that waits
-SETTLE_S = 2.5  # two reports of the node must agree that nothing is pending
+SETTLE_S = 1.5  # two reports of the node must agree that nothing is pending
+LOST_S = 10.0  # messages that have not arrived by then are lost
 STOP_S = 15.0
 NODE_NAME = '/pop'
 
@@ -77,6 +79,7 @@ class DdsPlayer:
         self._writer: BagWriter | None = None
         self._values: dict[str, str] = {}
         self._before: dict[str, str] = {}
+        self._published: Counter[str] = Counter()
         self._context = Context()
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
         self._node = Node('pop_replay', context=self._context)
@@ -130,30 +133,31 @@ class DdsPlayer:
         """Publish the bag's messages at `rate` times their own pace; return their number."""
         roles = {topics.color: COLOR, topics.depth: DEPTH, topics.info: INFO}
         started_s = first_ns = None
-        count = 0
         for message in bag.messages(topics.all):
             if started_s is None or first_ns is None:
                 started_s, first_ns = time.monotonic(), message.time_ns
             due_s = started_s + (message.time_ns - first_ns) / 1e9 / rate
             self._spin(due_s - time.monotonic(), lambda: False)
-            self._publishers[roles[message.topic]].publish(message.data)
-            count += 1
+            role = roles[message.topic]
+            self._publishers[role].publish(message.data)
+            self._published[role] += 1
             on_message()
-        return count
+        return self._published.total()
 
     def finish(self, summary: ReplaySummary) -> None:
         """Wait until the node has nothing left to do and take over its counts."""
-        settled_at: list[float] = []
+        lost_at_s = time.monotonic() + LOST_S
+        busy_at_s = time.monotonic()
 
         def is_idle() -> bool:
-            idle = self._values.get('pending') == '0'
-            if not idle:
-                settled_at.clear()
-            elif not settled_at:
-                settled_at.append(time.monotonic())
-            return idle and time.monotonic() - settled_at[0] > SETTLE_S
+            nonlocal busy_at_s
+            arrived = all(
+                self._count(f'{RECEIVED}{role}') >= n for role, n in self._published.items())
+            waits = not arrived and time.monotonic() < lost_at_s
+            if waits or self._values.get('pending') != '0':
+                busy_at_s = time.monotonic()
+            return time.monotonic() - busy_at_s > SETTLE_S
 
-        self._values.clear()
         if not self._spin(IDLE_S, is_idle):
             summary.notes.append(f'the node was still busy after {IDLE_S:.0f} s')
         summary.pairs = self._count('pairs')
@@ -162,7 +166,7 @@ class DdsPlayer:
         summary.latency_text = self._values.get('latency (pair to published)', '-')
         missed = self._count(MISSED)
         if missed:
-            summary.notes.append(f'{missed} colour images without depth; the node says why')
+            summary.notes.append(f'{missed} {MISSED}: {self._values.get(WHY_MISSED, "")}')
         for key in self._values:
             if key.startswith(DROP_PREFIX) and self._count(key):
                 summary.drops[key[len(DROP_PREFIX):]] = self._count(key)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections import Counter, deque
@@ -12,6 +13,12 @@ import numpy as np
 
 REMINDER_S = 5.0  # how often the same drop is said again
 WINDOW = 100  # latest frames that rates and percentiles are taken from
+
+
+def drop_reason(error: Exception) -> str:
+    """Return the kind of an error in words: `BadMessageError` is 'bad message'."""
+    name = type(error).__name__.removesuffix('Error')
+    return re.sub(r'(?<!^)(?=[A-Z])', ' ', name).lower()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,12 +90,13 @@ class NodeStatistics:
     def add_drop(self, reason: str, text: str) -> bool:
         """Count a dropped pair; return whether it is time to say so (first, then every 5 s)."""
         now = time.monotonic()
+        kind = re.sub(r'\d+', '#', text)  # stamps and sizes make no new kind of drop
         with self._lock:
             self.drops[reason] += 1
             self.latest_drop = text
-            due = now - self._said.get(reason, -np.inf) > REMINDER_S
+            due = now - self._said.get(kind, -np.inf) > REMINDER_S
             if due:
-                self._said[reason] = now
+                self._said[kind] = now
             return bool(due)
 
     def snapshot(self) -> Snapshot:
