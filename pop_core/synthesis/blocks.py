@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from functools import cache
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -130,6 +131,14 @@ def depth_inside(
     return (1.0 - np.linalg.norm(local / half, axis=1)) * half.min()
 
 
+def is_near(block: Block, p_room: Float[np.ndarray, 'n 3']) -> bool:
+    """Return whether the bounding box of points comes within a block's bounding sphere."""
+    centre = block.base + np.array([0.0, block.size_m[1] / 2, 0.0])
+    outside = np.maximum(p_room.min(axis=0) - centre, centre - p_room.max(axis=0))
+    reach = 0.5 * np.linalg.norm(block.size_m)
+    return bool(np.linalg.norm(np.maximum(outside, 0.0)) < reach)
+
+
 def block_surface(block: Block) -> Surface:
     """Return the triangles of a block in the room frame [m]."""
     if block.shape is Shape.BOX:
@@ -148,9 +157,16 @@ def grid(
     """Return a parallelogram cut into cells, facing u x v."""
     nu = max(1, int(np.ceil(np.linalg.norm(u) / cell_m)))
     nv = max(1, int(np.ceil(np.linalg.norm(v) / cell_m)))
+    a, b, faces = _unit_grid(nu, nv)
+    return corner + a * u + b * v, faces
+
+
+@cache
+def _unit_grid(
+    nu: int, nv: int
+) -> tuple[Float[np.ndarray, 'n 1'], Float[np.ndarray, 'n 1'], Int[np.ndarray, 'm 3']]:
     a, b = np.meshgrid(np.linspace(0, 1, nu + 1), np.linspace(0, 1, nv + 1), indexing='ij')
-    vertices = corner + a.reshape(-1, 1) * u + b.reshape(-1, 1) * v
-    return vertices, _grid_faces(nu, nv)
+    return a.reshape(-1, 1), b.reshape(-1, 1), _grid_faces(nu, nv)
 
 
 def _grid_faces(nu: int, nv: int) -> Int[np.ndarray, 'm 3']:
@@ -176,6 +192,7 @@ def _box_sides(
     return np.concatenate(vertices), np.concatenate(faces)
 
 
+@cache
 def _unit_round(shape: Shape) -> tuple[Float[np.ndarray, 'n 3'], Int[np.ndarray, 'm 3']]:
     """Return a unit cylinder or sphere about the vertical axis, underside at y = 0."""
     if shape is Shape.CYLINDER:

@@ -106,9 +106,13 @@ def _middle(model: BodyModel, actors: Sequence[Actor]) -> Float[np.ndarray, '3']
 
 def _apart(first: Actor, second: Actor) -> bool:
     """Return whether two people and their seats keep clear of each other."""
-    near, _ = cKDTree(second.surface[::6]).query(first.surface[::6])
-    in_seat = any(depth_inside(block, second.surface).max() > 0 for block in first.seat)
-    in_other = any(depth_inside(block, first.surface).max() > 0 for block in second.seat)
+    a, b = first.surface, second.surface
+    beside = np.maximum(a.min(axis=0) - b.max(axis=0), b.min(axis=0) - a.max(axis=0)).max()
+    if beside > PEOPLE_GAP_M and not (first.seat or second.seat):
+        return True
+    near, _ = cKDTree(b[::6]).query(a[::6])
+    in_seat = any(depth_inside(block, b).max() > 0 for block in first.seat)
+    in_other = any(depth_inside(block, a).max() > 0 for block in second.seat)
     return bool(near.min() > PEOPLE_GAP_M and not in_seat and not in_other)
 
 

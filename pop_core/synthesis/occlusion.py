@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 
 from pop_core.body.kinematics import joints
 from pop_core.body.model import BodyModel
-from pop_core.synthesis.blocks import Block, block_surface, depth_inside, moved
+from pop_core.synthesis.blocks import Block, block_surface, depth_inside, is_near, moved
 from pop_core.synthesis.occluders import OCCLUDERS
 from pop_core.synthesis.people import Actor
 from pop_core.synthesis.scene_config import SceneConfig
@@ -91,7 +91,8 @@ def is_free(
     for block in blocks:
         if depth_inside(block, eye[None])[0] > -CAMERA_GAP_M:
             return False
-        if any(depth_inside(block, actor.surface).max() > -0.005 for actor in actors):
+        close = [actor.surface for actor in actors if is_near(block, actor.surface)]
+        if any(depth_inside(block, surface).max() > -0.005 for surface in close):
             return False
     return True
 
