@@ -6,6 +6,7 @@ import math
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Int
@@ -75,7 +76,7 @@ def load_model_notes(path: Path) -> ModelNotes:
 def save_body_model(path: Path, model: BodyModel, notes: ModelNotes) -> None:
     """Write a body model: directions as float16 (0.1 mm at 20 cm), everything else 32 bits."""
     half, single, whole = np.float16, np.float32, np.int32
-    arrays: dict[str, np.ndarray] = {
+    arrays: dict[str, Any] = {
         'name': np.array(model.name),
         'licence': np.array(notes.licence),
         'provenance': np.array(notes.provenance),
@@ -137,7 +138,8 @@ def _read_arrays(path: Path) -> dict[str, np.ndarray]:
         raise ModelFileError(f'{path}: expected a body model file, found nothing') from error
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise ModelFileError(
-            f'{path}: expected an npz archive of plain arrays, found {error}; {IMPORT_HINT}'
+            f'{path}: expected an npz archive of plain arrays, found another or a damaged file, '
+            f'or pickled objects; {IMPORT_HINT}'
         ) from error
 
 

@@ -110,7 +110,10 @@ def _load_npz(path: Path) -> dict[str, Any]:
             names = [name for name in (*NEEDED, 'posedirs') if name in archive.files]
             return {name: archive[name] for name in names}
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise ModelFileError(f'{path}: expected an npz of plain arrays, found {error}') from error
+        # numpy's own message would advise to allow pickles.
+        raise ModelFileError(
+            f'{path}: expected an npz archive of plain arrays, found no such file'
+        ) from error
 
 
 def _family(weights: np.ndarray, path: Path) -> Family:
