@@ -106,17 +106,17 @@ class BodyPipeline:
         with watch.step('observe'):
             observation = observe(frame, lifted, taken, ground, detection.part_labels)
         with watch.step('retrieve'):
-            candidates = self._retrieve(lifted, observation)
+            candidates = self._retrieve(lifted, observation, frame.camera)
         with watch.step('fit'):
             fit = self.fitter.fit(observation, candidates)
         with watch.step('segment'):
-            estimate = self._estimate(frame, fit, lifted, taken)
+            estimate = self._estimate(frame, fit, ground, taken)
         if estimate.score < self.config.min_support:
             return None, EstimateStatus.NO_SUPPORT
         return estimate, EstimateStatus.OK
 
     def _retrieve(
-        self, lifted: LiftedJoints, observation: Observation
+        self, lifted: LiftedJoints, observation: Observation, camera: Camera
     ) -> Sequence[PoseCandidate]:
         def in_the_open_m(p_camera: Float[np.ndarray, 'n 3']) -> Float[np.ndarray, 'n']:
             """Return how far points stand in front of what the camera measured there."""
@@ -127,16 +127,25 @@ class BodyPipeline:
             # Nor can anything hide below the floor.
             return np.maximum(open_m, -observation.ground.height(p_camera))
 
-        return retrieve(self.library, lifted, self.config.retrieval, hides=in_the_open_m)
+        gravity = None if observation.ground is None else -observation.ground.normal
+        return retrieve(
+            self.library, lifted, self.config.retrieval, hides=in_the_open_m, gravity=gravity,
+            camera=camera)
 
     def _estimate(
-        self, frame: RgbdFrame, fit: BodyFit, lifted: LiftedJoints, taken: Bool[np.ndarray, 'h w']
+        self,
+        frame: RgbdFrame,
+        fit: BodyFit,
+        ground: Ground | None,
+        taken: Bool[np.ndarray, 'h w'],
     ) -> BodyEstimate:
         """Return the result of a fit at the frame's full resolution."""
         parameters = fit.parameters
         mesh = vertices(self.model, parameters)
         rendered = render_depth(mesh, self.model.f, frame.camera)
         own = np.isfinite(frame.depth_m) & ~taken
+        if ground is not None:
+            own &= ~ground.floor_pixels(frame.depth_m, frame.camera.ray_grid())
         mask = segment_body(
             frame.depth_m, rendered, own, frame.camera.fx, self.config.segmentation)
         joints = fit.coarse.joints

@@ -30,6 +30,7 @@ from pop_core.fitting.levenberg_marquardt import FIRST_DAMPING, cost_of, levenbe
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.priors import neighbour_sigma_rad
 from pop_core.fitting.residuals import Pairs, join_pairs
+from pop_core.fitting.robust_loss import geman_mcclure_share
 from pop_core.retrieval.candidate import PoseCandidate
 from pop_core.retrieval.pose_prior import PosePrior
 from pop_core.segmentation.body_segmentation import SegmentationConfig, segment_body
@@ -278,9 +279,11 @@ class BodyFitter:
     ) -> None:
         """Set each hypothesis's cost: E_depth on common pixels, keypoints and priors beside it."""
         for hypothesis in hypotheses:
-            floor = observation.ground and ground_pairs(hypothesis.state, observation.ground)
+            floor = observation.ground and ground_pairs(
+                hypothesis.state, observation.ground, geman_mcclure_share)
             energy = BodyEnergy(
-                hypothesis.state, observation, hypothesis.belief, self._weights(1.0), floor)
+                hypothesis.state, observation, hypothesis.belief, self._weights(1.0), floor,
+                geman_mcclure_share)
             rest = cost_of(energy.residuals(hypothesis.state, False))
             visibility = see_body(hypothesis.state, observation)
             depth = depth_energy(visibility, observation, segment)

@@ -24,6 +24,7 @@ from pop_core.fitting.residuals import (
     ray_residual,
     ray_weight,
 )
+from pop_core.fitting.robust_loss import Kernel, geman_mcclure_weight
 from pop_core.retrieval.pose_prior import PosePrior
 
 
@@ -69,13 +70,15 @@ class BodyEnergy:
         belief: PriorBelief,
         weights: TermWeights,
         pairs: Pairs | None = None,
+        kernel: Kernel = geman_mcclure_weight,
     ) -> None:
-        """Freeze robust weights at `state`."""
+        """Freeze robust weights at `state`: those of a step, or the kernel's own to compare."""
         self.observation, self.belief, self.weights, self.pairs = (
             observation, belief, weights, pairs)
         lifted, rays = observation.lifted, observation.keypoint_rays
-        self.joint_weight = weights.joints * joint_weight(state, lifted, weights.robust_m)
-        self.ray_weight = weights.joints * ray_weight(state, rays)
+        self.joint_weight = weights.joints * joint_weight(
+            state, lifted, weights.robust_m, kernel)
+        self.ray_weight = weights.joints * ray_weight(state, rays, kernel)
 
     def residuals(self, state: BodyState, jacobian: bool) -> list[Residual]:  # noqa: FBT001
         """Return every block of residuals at a state."""

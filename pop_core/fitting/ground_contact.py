@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.residuals import Pairs, join_pairs
-from pop_core.fitting.robust_loss import geman_mcclure_weight
+from pop_core.fitting.robust_loss import Kernel, geman_mcclure_weight
 from pop_core.segmentation.ground import Ground
 
 BELOW_SIGMA_M = 0.01
@@ -21,12 +21,15 @@ CONTACT_SCALE_M = 0.30  # feet higher than this above the floor are not on it
 TOLERANCE_M = 0.02  # the floor is an estimate too
 
 
-def ground_pairs(state: BodyState, ground: Ground) -> Pairs:
+def ground_pairs(
+    state: BodyState, ground: Ground, kernel: Kernel = geman_mcclure_weight
+) -> Pairs:
     """Return where vertices below the floor and soles above it should go.
 
     Args:
         state: Body.
         ground: The floor.
+        kernel: Robust weight of a sole's height: a step's, or the kernel's own to compare.
     """
     height = ground.height(state.vertices)
     share = _share(state)
@@ -37,7 +40,7 @@ def ground_pairs(state: BodyState, ground: Ground) -> Pairs:
     for sole, foot_height in zip(state.body.soles, contact, strict=True):
         # One foot carries the person; the other may be in the air.
         carries = 1.0 if foot_height <= min(contact) else 0.3
-        weight = geman_mcclure_weight(height[sole], CONTACT_SCALE_M) * carries
+        weight = kernel(height[sole], CONTACT_SCALE_M) * carries
         pairs = _on_floor(state, sole, height, ground, weight / CONTACT_SIGMA_M**2)
         parts.append(_scaled(pairs, 4.0 / max(len(sole), 1)))
     return join_pairs(parts)

@@ -69,7 +69,7 @@ class Observation:
         camera: Pinhole of the cut-out.
         depth_m: Measured depth [m]; NaN is no measurement.
         rays: (x/z, y/z) of every pixel.
-        own: Pixels that may show this person: measured, not flying, not another person's.
+        own: Pixels that may show this person: measured, not flying, not the floor, nobody else's.
         labels: Body part per pixel as a joint index, -1 where unknown; None without a part map.
         lifted: Lifted joints of the person.
         keypoint_rays: Rays of the keypoints that were not lifted.
@@ -134,6 +134,8 @@ def observe(
     own = np.isfinite(depth_m) & ~window.cut(others) & ~window.cut(flying_pixels(frame.depth_m))
     parts = None if labels is None else window.cut(labels)
     rays = camera.ray_grid()
+    if ground is not None:
+        own &= ~ground.floor_pixels(depth_m, rays)
     rays_of_keypoints = keypoint_rays(lifted, frame.camera)
     return Observation(window, camera, depth_m, rays, own, parts, lifted, rays_of_keypoints, ground)
 

@@ -14,17 +14,19 @@ from jaxtyping import Float, Int
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.levenberg_marquardt import Residual
 from pop_core.fitting.observation import KeypointRays
-from pop_core.fitting.robust_loss import geman_mcclure_weight
+from pop_core.fitting.robust_loss import Kernel
 from pop_core.keypoints.lifted_joints import LiftedJoints
 
 
+RAY_SCALE_M = 0.25  # a guessed pixel may be on another limb
+
 
 def joint_weight(
-    state: BodyState, lifted: LiftedJoints, scale_m: float
+    state: BodyState, lifted: LiftedJoints, scale_m: float, kernel: Kernel
 ) -> Float[np.ndarray, 's']:
     """Return the robust weight 1/sigma^2 of every shared joint, zero unless lifted."""
     distance = np.linalg.norm(state.landmarks - lifted.positions_camera, axis=1)
-    robust = geman_mcclure_weight(np.where(lifted.lifted, distance, 0.0), scale_m)
+    robust = kernel(np.where(lifted.lifted, distance, 0.0), scale_m)
     return np.where(lifted.lifted, robust / lifted.sigma_m**2, 0.0)
 
 
@@ -38,7 +40,9 @@ def joint_residual(
     return Residual(difference, J, np.repeat(weight[rows], 3))
 
 
-def ray_weight(state: BodyState, rays: KeypointRays) -> Float[np.ndarray, 's']:
+def ray_weight(
+    state: BodyState, rays: KeypointRays, kernel: Kernel
+) -> Float[np.ndarray, 's']:
     """Return the weight 1/sigma^2 of keypoints that have a pixel but no depth, zero elsewhere.
 
     A detector's pixel of a hidden joint fixes its direction though nothing fixes its distance.
@@ -47,7 +51,7 @@ def ray_weight(state: BodyState, rays: KeypointRays) -> Float[np.ndarray, 's']:
     points = state.landmarks[rays.joint]
     sigma_m = rays.sigma * np.maximum(points[:, 2], 0.3)
     distance = np.linalg.norm(np.einsum('nkc,nc->nk', rays.across, points), axis=1)
-    weight[rays.joint] = rays.score * geman_mcclure_weight(distance, 0.25) / sigma_m**2
+    weight[rays.joint] = rays.score * kernel(distance, RAY_SCALE_M) / sigma_m**2
     return weight
 
 
@@ -99,7 +103,7 @@ def join_pairs(parts: Sequence[Pairs]) -> Pairs:
 
 
 def pair_residual(state: BodyState, pairs: Pairs, *, jacobian: bool) -> Residual:
-    """Return the offset of vertices from their targets along each pair's direction."""
+    """Return E_NN: offsets of vertices from their targets along each pair's direction."""
     offset = state.vertices[pairs.vertex] - pairs.target
     r = np.einsum('nc,nc->n', pairs.direction, offset)
     J = state.directional_jacobian(pairs.vertex, pairs.direction) if jacobian else None

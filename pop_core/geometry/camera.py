@@ -105,6 +105,10 @@ class Camera:
 
     def ray_grid(self) -> Float[np.ndarray, 'h w 2']:
         """Return (x/z, y/z) of every pixel: multiply by depth [m] for points."""
+        if not self.is_distorted:
+            x = (np.arange(self.width) - self.cx) / self.fx
+            y = (np.arange(self.height) - self.cy) / self.fy
+            return np.stack(np.broadcast_arrays(x, y[:, None]), axis=-1)
         v, u = np.mgrid[: self.height, : self.width]
         uv = np.column_stack([u.ravel(), v.ravel()]).astype(np.float64)
         rays = self.unproject(uv, np.ones(len(uv)))

@@ -15,7 +15,9 @@ GRID_PX = 80  # longest side of the thinned image: a floor is large
 TILT_COS = 0.6  # cameras look down or up by at most 53 degrees
 ROLL_SIN = 0.35
 INLIER_M = 0.03
-REFINEMENTS = 3
+FLOOR_M = 0.02  # shoes begin above this
+ALIKE_COS = 0.85
+NARROWINGS = (1.0, 0.6, 0.4)  # of the inlier band, refinement by refinement
 MIN_SHARE = 0.02  # of all measured points
 MAX_BELOW = 0.02  # share of points that may lie below a floor: mirrors, noise
 
@@ -35,6 +37,20 @@ class Ground:
     def height(self, p_camera: Float[np.ndarray, 'n 3']) -> Float[np.ndarray, 'n']:
         """Return heights above the floor [m]."""
         return p_camera @ self.normal + self.offset_m
+
+    def floor_pixels(
+        self, depth_m: Float32[np.ndarray, 'h w'], rays: Float[np.ndarray, 'h w 2']
+    ) -> Bool[np.ndarray, 'h w']:
+        """Return the pixels that show the floor itself.
+
+        Args:
+            depth_m: Measured depth [m]; NaN is no floor.
+            rays: (x/z, y/z) of every pixel.
+        """
+        along_ray = rays @ self.normal[:2] + self.normal[2]
+        width = FLOOR_M + 0.002 * depth_m**2
+        with np.errstate(invalid='ignore'):
+            return np.asarray(depth_m * along_ray + self.offset_m < width)
 
 
 def find_ground(frame: RgbdFrame, tries: int = 60) -> Ground | None:
@@ -65,8 +81,10 @@ def find_ground(frame: RgbdFrame, tries: int = 60) -> Ground | None:
     if support[best] < MIN_SHARE:
         return None
     ground = Ground(normal[best], float(-normal[best] @ on_plane[best]))
-    for _ in range(REFINEMENTS):
-        ground = _refine(ground, points, width[:, 0])
+    for narrowing in NARROWINGS:
+        # Points of a wall's foot lie near the floor too, but face another way.
+        alike = normals @ ground.normal > ALIKE_COS
+        ground = _refine(ground, points[alike], narrowing * width[alike, 0])
     return ground
 
 

@@ -1,0 +1,58 @@
+import numpy as np
+
+from pop_core.rendering.depth_renderer import RenderedDepth
+from pop_core.segmentation.body_segmentation import SegmentationConfig, segment_body
+
+SHAPE = (60, 80)
+FOCAL_PX = 100.0
+CONFIG = SegmentationConfig()
+EVERY = np.ones(SHAPE, dtype=bool)
+
+
+def scene(body_m: float = 2.0, wall_m: float = 4.0) -> tuple[np.ndarray, RenderedDepth, np.ndarray]:
+    """A flat body on a wall; the rendered body is two pixels narrower than the real one."""
+    truth = np.zeros(SHAPE, dtype=bool)
+    truth[10:50, 30:50] = True
+    depth = np.where(truth, body_m, wall_m).astype(np.float32)
+    face = np.full(SHAPE, -1, dtype=np.int32)
+    face[10:50, 32:48] = 0
+    rendered = np.where(face >= 0, np.float32(body_m), np.float32(np.inf))
+    return depth, RenderedDepth(rendered, face), truth
+
+
+def test_growth_reaches_the_true_border_and_stops_there() -> None:
+    depth, rendered, truth = scene()
+    np.testing.assert_array_equal(segment_body(depth, rendered, EVERY, FOCAL_PX, CONFIG), truth)
+
+
+def test_growth_stays_near_the_silhouette_on_a_surface_that_goes_on() -> None:
+    depth, rendered, _ = scene(wall_m=2.01)  # a seat a centimetre behind the body
+    mask = segment_body(depth, rendered, EVERY, FOCAL_PX, CONFIG)
+    reach_px = CONFIG.growth_m * FOCAL_PX / 2.0
+    columns = np.flatnonzero(mask.any(axis=0))
+    assert columns.min() >= 32 - reach_px
+    assert columns.max() <= 47 + reach_px
+
+
+def test_an_occluder_in_front_is_not_the_body() -> None:
+    depth, rendered, truth = scene()
+    depth[30:50] = 1.0
+    mask = segment_body(depth, rendered, EVERY, FOCAL_PX, CONFIG)
+    assert not mask[30:50].any()
+    np.testing.assert_array_equal(mask[:30], truth[:30])
+
+
+def test_pixels_of_another_person_are_left_to_them() -> None:
+    depth, rendered, truth = scene()
+    own = EVERY.copy()
+    own[:, 40:] = False
+    mask = segment_body(depth, rendered, own, FOCAL_PX, CONFIG)
+    assert not mask[:, 40:].any()
+    np.testing.assert_array_equal(mask[:, :40], truth[:, :40])
+
+
+def test_a_body_outside_the_image_has_no_pixels() -> None:
+    depth, _, _ = scene()
+    nothing = RenderedDepth(
+        np.full(SHAPE, np.inf, dtype=np.float32), np.full(SHAPE, -1, dtype=np.int32))
+    assert not segment_body(depth, nothing, EVERY, FOCAL_PX, CONFIG).any()

@@ -1,0 +1,66 @@
+import numpy as np
+import pytest
+
+from pop_core.geometry.camera import Camera
+from pop_core.geometry.rotation import from_rotvec
+from pop_core.rgbd import RgbdFrame
+from pop_core.segmentation.ground import Ground, find_ground
+
+CAMERA = Camera(320, 240, 262.0, 262.0, 159.5, 119.5)
+
+
+def room(pitch_rad: float, roll_rad: float, height_m: float, noise: float) -> tuple:
+    """A floor and a wall behind it, seen by a tilted camera; and the true floor."""
+    R = from_rotvec(np.array([pitch_rad, 0.0, 0.0])) @ from_rotvec(np.array([0, 0, roll_rad]))
+    normal = R @ np.array([0.0, -1.0, 0.0])
+    rays = np.dstack([CAMERA.ray_grid(), np.ones((240, 320))])
+    along = rays @ normal
+    floor_m = np.where(along < 0, -height_m / np.minimum(along, -1e-9), np.inf)
+    depth = np.minimum(floor_m, 5.0)
+    rng = np.random.default_rng(0)
+    depth = depth + noise * rng.normal(size=depth.shape) * depth**2
+    return depth.astype(np.float32), Ground(normal, height_m)
+
+
+def frame(depth: np.ndarray) -> RgbdFrame:
+    return RgbdFrame(np.zeros((240, 320, 3), dtype=np.uint8), depth, CAMERA)
+
+
+@pytest.mark.parametrize(('pitch', 'roll', 'height'), [(0.0, 0.0, 1.2), (0.5, 0.1, 1.8),
+                                                       (0.3, -0.2, 0.6)])
+def test_the_floor_of_a_tilted_camera_is_found(pitch: float, roll: float, height: float) -> None:
+    depth, truth = room(pitch, roll, height, noise=0.002)
+    found = find_ground(frame(depth))
+    assert found is not None
+    assert found.offset_m == pytest.approx(height, abs=0.02)  # sensor noise at 5 m is 5 cm
+    assert np.degrees(np.arccos(found.normal @ truth.normal)) < 1.0
+
+
+def test_a_table_above_the_floor_is_not_the_floor() -> None:
+    depth, _ = room(0.5, 0.0, 1.6, noise=0.0)
+    table, _ = room(0.5, 0.0, 0.8, noise=0.0)
+    depth[120:, 60:260] = table[120:, 60:260]
+    found = find_ground(frame(depth))
+    assert found is not None
+    assert found.offset_m == pytest.approx(1.6, abs=0.02)
+
+
+def test_a_wall_alone_has_no_floor() -> None:
+    assert find_ground(frame(np.full((240, 320), 2.0, dtype=np.float32))) is None
+
+
+def test_nothing_measured_has_no_floor() -> None:
+    assert find_ground(frame(np.full((240, 320), np.nan, dtype=np.float32))) is None
+
+
+def test_floor_pixels_are_those_of_the_floor() -> None:
+    depth, truth = room(0.4, 0.0, 1.4, noise=0.0)
+    rays = CAMERA.ray_grid()
+    marked = truth.floor_pixels(depth, rays)
+    assert marked[depth < 5.0].all()
+    points = np.dstack([rays * depth[..., None], depth]).reshape(-1, 3)
+    high = truth.height(points).reshape(depth.shape) > 0.1  # twice the band at 5 m
+    assert high.any()
+    assert not marked[high].any()
+    raised = np.where(depth < 5.0, depth * 0.9, depth).astype(np.float32)
+    assert not truth.floor_pixels(raised, rays)[depth < 5.0].any()
