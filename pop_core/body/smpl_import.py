@@ -112,7 +112,8 @@ def _load_npz(path: Path) -> dict[str, Any]:
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         # numpy's own message would advise to allow pickles.
         raise ModelFileError(
-            f'{path}: expected an npz archive of plain arrays, found no such file'
+            f'{path}: expected an npz archive of plain arrays, found none, a damaged one, or '
+            'pickled objects'
         ) from error
 
 
