@@ -14,12 +14,12 @@ from jaxtyping import Float, Float32, Int
 
 from pop_core.keypoints import lifting_kernels as kernels
 from pop_core.keypoints.depth_layers import DepthLayers
-from pop_core.keypoints.skeleton import LEGS, ORDER, PATH_M, TREE_PARENT, linked
+from pop_core.keypoints.skeleton import LEGS, ORDER, PATH_M, linked
 
 BIN_M = 0.03
 MAX_BINS = 320
 # Costs are -log likelihoods.
-HIDDEN_COST = 2.5  # a joint behind an occluder
+HIDDEN_COST = 2.5  # a joint behind an occluder; times the score: guesses are often hidden
 WRONG_COST = 6.0  # a keypoint that shows no surface its joint could lie behind
 FOREIGN_COST = 4.0  # a surface outside the person's mask
 BROKEN_BONE_COST = 8.0
@@ -54,17 +54,20 @@ def layer_prices(
 ) -> Float[np.ndarray, 's l']:
     """Return the cost of lifting each keypoint onto each surface, whatever its depth.
 
-    Surfaces of a small share of the patch cost, and so do those outside the person's mask and
-    those that jump out toward the camera on the way from the next joint: occluders.
+    Surfaces of a small share of the patch cost, and so do those outside the person's mask, and
+    those before a leg that jump out toward the camera on the way down from the hip: occluders.
+    Arms cross the body far too often for that.
     """
     price = -np.log(np.maximum(layers.share, 1e-6)) + FOREIGN_COST * (1.0 - layers.own_share)
     links = linked(layers.known)
-    for j in np.flatnonzero(links >= 0):
+    gap_m = np.zeros(len(keypoints_px))
+    for j in LEGS[links[LEGS] >= 0]:
         (u0, v0), (u1, v1) = keypoints_px[links[j]], keypoints_px[j]
-        gap_m = kernels.approach(depth_m, u0, v0, u1, v1, jump_ratio)
-        certainty = 1.0 if links[j] == TREE_PARENT[j] or j in LEGS else 0.5
+        jump_m = kernels.approach(depth_m, u0, v0, u1, v1, jump_ratio)
+        # What hides a knee hides the ankle below it, though no edge lies between them.
+        gap_m[j] = gap_m[links[j]] + jump_m
         front = layers.depth_m[j] <= layers.depth_m[j][layers.share[j].argmax()]
-        price[j] += front * certainty * OCCLUDER_COST * min(1.0, gap_m / OCCLUDER_GAP_M)
+        price[j] += front * OCCLUDER_COST * np.clip(gap_m[j] / OCCLUDER_GAP_M, 0.0, 1.0)
     return price
 
 
@@ -121,7 +124,7 @@ def _unary(
     gap = (bins - joints.depth_m[..., None]) / sigma_m[..., None]
     behind = 0.5 * gap**2 + joints.price[..., None]
     # Something nearer than the joint hides it; a surface that fills the patch hides it best.
-    price_hidden = (HIDDEN_COST - np.log(np.maximum(share, 1e-6)))[..., None]
-    hidden = np.where(gap > 0, price_hidden, np.inf)
+    price_hidden = HIDDEN_COST * scores[:, None] - np.log(np.maximum(share, 1e-6))
+    hidden = np.where(gap > 0, price_hidden[..., None], np.inf)
     each = np.where(present[..., None], np.minimum(behind, hidden), np.inf)
     return np.minimum(each.min(axis=1), WRONG_COST) * (0.3 + 0.7 * scores[:, None])

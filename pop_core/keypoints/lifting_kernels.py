@@ -75,7 +75,7 @@ def _keep_layer(z, weight, mine, members, total, layers, kept):
 
 @njit(cache=True, nogil=True)
 def approach(depth, u0, v0, u1, v1, jump_ratio):
-    """Return how far the surface jumps toward the camera between two pixels [m], at least 0.
+    """Return how far the surface jumps toward the camera between two pixels [m].
 
     Smooth changes count nothing: a limb pointing at the camera approaches without a jump, and a
     hand passed on the way jumps near and far again.
@@ -93,7 +93,7 @@ def approach(depth, u0, v0, u1, v1, jump_ratio):
         if not np.isnan(last) and abs(z - last) > jump_ratio * min(z, last):
             total += last - z
         last = z
-    return max(0.0, total)
+    return total
 
 
 @njit(cache=True, nogil=True)

@@ -47,6 +47,7 @@ TORSO = np.array([
     SHARED_INDEX[name] for name in
     ('pelvis', 'neck', 'left_hip', 'right_hip', 'left_shoulder', 'right_shoulder')
 ])
+HIPS = np.array([SHARED_INDEX['left_hip'], SHARED_INDEX['right_hip']])
 LEGS = np.array([
     SHARED_INDEX[f'{side}_{name}'] for side in ('left', 'right') for name in ('knee', 'ankle')
 ])

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from pop_core.body.joints import SHARED_INDEX, SHARED_MIRROR
 from pop_core.keypoints.lifted_joints import LiftState
-from pop_core.keypoints.skeleton import BONE_M, LIMB_ENDS, TREE_PARENT
+from pop_core.keypoints.skeleton import BONE_M, HIPS, LIMB_ENDS, TREE_PARENT
 
 SLACK_M = 0.1  # keypoint and depth errors of both ends
 SHORTEST = 0.4  # of a limb's bone, relative to the mean: shorter ones are noise at best
@@ -69,8 +69,10 @@ def without_hidden_limbs(
             state[j if scores[j] < scores[mirrored] else mirrored] = LiftState.OCCLUDED
         parent = TREE_PARENT[j]
         if too_short[j] and state[j] == state[parent] == LiftState.VISIBLE:
-            hidden = parent if parent in LIMB_ENDS and scores[parent] < scores[j] else j
-            state[hidden] = LiftState.OCCLUDED
+            # A thigh hardly ever points away from a camera that sees its knee.
+            thigh = parent in HIPS
+            guessed = parent in LIMB_ENDS and scores[parent] < scores[j]
+            state[parent if thigh or guessed else j] = LiftState.OCCLUDED
     return state
 
 

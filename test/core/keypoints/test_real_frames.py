@@ -1,0 +1,65 @@
+"""The PersonLab network on real frames; skipped where the shared data is not there."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from pop_core.body.joints import SHARED_INDEX
+from pop_core.geometry.camera import Camera
+from pop_core.keypoints.lifting import lift_keypoints
+from pop_core.keypoints.onnx_detector import OnnxKeypointDetector
+from pop_core.rgbd import RgbdFrame, clean_depth
+
+SHARED = Path(__file__).resolve().parents[4] / 'shared' / 'data'
+NETWORK = SHARED / 'models' / 'posenet_mobilenet_v1_075_481_641_dequant.onnx'
+SOFA = ('00', '06', '12', '18', '24', '30', '36', '42', '48', '54', '60', '66')
+
+
+@pytest.fixture(scope='module')
+def detector():
+    if not NETWORK.is_file():
+        pytest.skip(f'looked for {NETWORK}')
+    return OnnxKeypointDetector(NETWORK)
+
+
+def load(name):
+    folder = SHARED / 'rgbd' / name
+    if not folder.is_dir():
+        pytest.skip(f'looked for {folder}')
+    file = next(p for p in (folder / 'camera.json', folder.parent / 'camera.json') if p.is_file())
+    k = json.loads(file.read_text())
+    rgb = cv2.cvtColor(cv2.imread(str(folder / 'color.png')), cv2.COLOR_BGR2RGB)
+    depth = cv2.imread(str(folder / 'depth.png'), cv2.IMREAD_UNCHANGED).astype(np.float32) / 1000
+    camera = Camera(k['width'], k['height'], k['fx'], k['fy'], k['cx'], k['cy'])
+    return RgbdFrame(rgb, clean_depth(depth), camera)
+
+
+def test_five_people_are_five(detector):
+    frame = load('five_people')
+    people = detector.detect(frame)
+    assert len(people) == 5
+    pelvis = [lift_keypoints(frame, p).positions_camera[0] for p in people]
+    # Two pairs within arm's length, nobody in the place of another.
+    gaps = [np.linalg.norm(a - b) for i, a in enumerate(pelvis) for b in pelvis[:i]]
+    assert min(gaps) > 0.3
+    assert all(1.6 < p[2] < 3.2 for p in pelvis)
+
+
+def test_an_empty_office_holds_nobody(detector):
+    assert detector.detect(load('office_empty')) == []
+
+
+@pytest.mark.parametrize('number', SOFA)
+def test_one_man_sits_on_the_sofa(detector, number):
+    frame = load(f'sofa_pointing/{number}')
+    people = detector.detect(frame)
+    assert len(people) == 1
+    lifted = lift_keypoints(frame, people[0])
+    assert lifted.lifted.sum() >= 9
+    knees = [SHARED_INDEX['left_knee'], SHARED_INDEX['right_knee']]
+    torso = lifted.positions_camera[SHARED_INDEX['neck']]
+    # Seated: knees nearer to the camera than the shoulders.
+    assert np.nanmedian(lifted.positions_camera[knees, 2]) < torso[2] + 0.1
