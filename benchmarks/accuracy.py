@@ -25,7 +25,7 @@ from benchmarks.accuracy_methods import (
     RetrievalOnly,
 )
 from benchmarks.accuracy_records import match, person_record
-from benchmarks.accuracy_summary import coverage_lines, summarise, table
+from benchmarks.accuracy_summary import coverage_lines, group_lines, summarise, table
 from pop_core.body.default_body import default_body
 from pop_core.body.model import BodyModel
 from pop_core.config import PipelineConfig
@@ -64,6 +64,8 @@ def run(argv: list[str]) -> int:
     entries = [cache.done[seed] for seed in seeds]
     report = summary_of(entries, list(methods))
     print_report(report, console)
+    for line in group_lines(people_of(entries, MAIN)):
+        console.print(line)
     if options.json is not None:
         people = {name: people_of(entries, name) for name in methods}
         options.json.write_text(json.dumps(report | {'records': people}), encoding='utf-8')

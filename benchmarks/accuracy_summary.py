@@ -137,6 +137,21 @@ def table(summaries: dict[str, dict[str, Any]], main: str) -> Table:
     return shown
 
 
+def group_lines(records: Sequence[Record]) -> list[str]:
+    """Return sentences on where errors come from: poses, sensors, children."""
+    lines = []
+    for name in ('kind', 'sensor', 'child'):
+        cells = []
+        for value in sorted({record[name] for record in records}, key=str):
+            group = [record for record in records if record[name] == value]
+            errors = [record['err_pose'] for record in group if record['found']]
+            failed = len(group) - sum(error <= FAILURE_M for error in errors)
+            median = 1000 * float(np.median(errors)) if errors else float('nan')
+            cells.append(f'{value} {median:.0f} mm, {failed} of {len(group)} failed')
+        lines.append(f'by {name} (median err_pose): ' + '; '.join(cells))
+    return lines
+
+
 def coverage_lines(summary: dict[str, Any]) -> list[str]:
     """Return sentences on how well the stated covariances hold."""
     return [

@@ -10,7 +10,13 @@ from benchmarks.__main__ import main, runnable
 from benchmarks.accuracy_methods import GivenDetections, Guess, place_mean_body
 from benchmarks.accuracy_pictures import curves_picture, scene_picture
 from benchmarks.accuracy_records import CURVE_M, match, observed_points, person_record
-from benchmarks.accuracy_summary import FAILURE_M, coverage_lines, summarise, table
+from benchmarks.accuracy_summary import (
+    FAILURE_M,
+    coverage_lines,
+    group_lines,
+    summarise,
+    table,
+)
 from pop_core.body.default_body import default_body
 from pop_core.body.kinematics import attached_positions
 from pop_core.body.model import rest_parameters, shared_points
@@ -140,6 +146,14 @@ def test_coverage_counts_joints_inside_their_ellipsoids():
                          record_of(0.02, squared=50.0), record_of(0.02, squared=0.1)])
     assert summary['coverage']['visible'] == {'68': 0.5, '95': 0.75, 'n': 96}
     assert 'visible: 50 % in the 68 % ellipsoid' in coverage_lines(summary)[0]
+
+
+def test_groups_tell_which_poses_fail():
+    common = {'sensor': 'stereo', 'child': False, 'found': True}
+    records = [
+        common | {'kind': 'lying', 'err_pose': 0.3}, common | {'kind': 'lying', 'err_pose': 0.1},
+        common | {'kind': 'standing', 'err_pose': 0.02}]
+    assert 'lying 200 mm, 1 of 2 failed; standing 20 mm, 0 of 1 failed' in group_lines(records)[0]
 
 
 def test_the_table_shows_every_method():
