@@ -11,11 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Float32, Int
+from jaxtyping import Bool, Float, Float32, Int
 
 from pop_core.geometry.camera import Camera
 from pop_core.geometry.rotation import from_rotvec
 from pop_core.keypoints.lifted_joints import LiftedJoints
+from pop_core.retrieval import diversity_kernels as kernels
 from pop_core.retrieval.candidate import PoseCandidate
 from pop_core.retrieval.pose_library import PoseLibrary, visibility_mask
 from pop_core.retrieval.procrustes import (
@@ -47,8 +48,8 @@ class RetrievalConfig:
         0.10, unit='m', minimum=0.005, maximum=1.0,
         about='Tolerated distance of a hidden joint in front of the measured surface.')
     diversity_m: float = setting(
-        0.12, unit='m', minimum=0.0, maximum=1.0,
-        about='Mean distance of hidden joints between two returned poses, relaxed if need be.')
+        0.12, unit='m', minimum=0.01, maximum=1.0,
+        about='A returned pose stands for all within this mean distance at the hidden joints.')
     smallest_scale: float = setting(
         0.5, minimum=0.2, maximum=1.0, about='Smallest person, in sizes of the library body.')
     largest_scale: float = setting(
@@ -98,9 +99,7 @@ def retrieve(
     joints_camera = placed.apply(joints) @ R_camera_up.T
     energy = placed.residual_m**2 * weight.sum() - 2.0 * np.log(library.weights[shortlist])
     energy += hidden_energy(joints_camera, lifted, config, hides, camera)
-    chosen = choose_diverse(joints_camera, energy, ~seen, config)
-    belief = np.exp(-0.5 * (energy[chosen] - energy[chosen].min()))
-    belief /= belief.sum()
+    chosen, belief = choose_diverse(joints_camera, energy, ~seen, config)
     return [
         PoseCandidate(
             body_pose=np.asarray(library.body_pose[pose], dtype=np.float64),
@@ -148,26 +147,32 @@ def hidden_energy(
 def choose_diverse(
     joints: Float[np.ndarray, 'n s 3'],
     energy: Float[np.ndarray, 'n'],
-    hidden: np.ndarray,
+    hidden: Bool[np.ndarray, 's'],
     config: RetrievalConfig,
-) -> Int[np.ndarray, 'k']:
-    """Return up to K indices, best first, each away from all better ones at the hidden joints.
+) -> tuple[Int[np.ndarray, 'k'], Float[np.ndarray, 'k']]:
+    """Return up to K poses that together cover what may be true, and the belief in each.
 
-    Where everything is seen, all joints count. The distance is halved until enough are found.
+    The first is the best. Each further one covers most of the belief exp(-energy/2) that no chosen
+    pose lies near yet, near meaning `diversity_m` at the hidden joints (at all joints when none is
+    hidden). This finds the truth more often than taking the next best pose far enough from the
+    others: 70 against 60 % within 10 cm at K = 6 with 60 % of the joints hidden
+    (benchmarks/retrieval).
+
+    Returns:
+        Indices, the best first and the others by falling belief, and the share of belief that
+        each stands for; shares sum to one.
     """
-    order = np.argsort(energy, kind='stable')
+    belief = np.exp(-0.5 * (energy - energy.min()))
+    belief /= belief.sum()
     points = joints[:, hidden] if hidden.any() else joints
-    wanted = min(config.candidates, len(order))
-    apart_m = config.diversity_m
-    while True:
-        chosen: list[int] = []
-        for i in order:
-            gap = np.linalg.norm(points[chosen] - points[i], axis=2).mean(axis=1)
-            if len(chosen) == 0 or gap.min() >= apart_m:
-                chosen.append(int(i))
-            if len(chosen) == wanted:
-                return np.array(chosen)
-        apart_m = 0.5 * apart_m if apart_m > 1e-3 else 0.0
+    chosen = np.empty(min(config.candidates, len(energy)), dtype=np.int64)
+    owner = np.empty(len(energy), dtype=np.int64)
+    kernels.cover(
+        np.ascontiguousarray(points), belief, config.diversity_m, int(np.argmin(energy)),
+        chosen, owner)
+    share = np.bincount(owner, weights=belief, minlength=len(chosen))
+    order = np.append(0, 1 + np.argsort(-share[1:], kind='stable'))
+    return chosen[order], share[order]
 
 
 def _shortlist(
