@@ -206,9 +206,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
-    rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
+    # The first matching rule wins, so that the user's own remappings come before the preset's.
+    rclpy.init(
+        args=argv + arguments.as_remappings(), signal_handler_options=SignalHandlerOptions.NO)
     try:
-        return _run(arguments, stopping)
+        return _run(arguments.sources, stopping)
     finally:
         rclpy.try_shutdown()  # type: ignore[attr-defined]
 

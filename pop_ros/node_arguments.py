@@ -1,4 +1,4 @@
-"""What the node is told on its command line beside ROS arguments: where keypoints come from."""
+"""What the node is told on its command line beside ROS arguments: keypoints and camera."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from pop_ros.camera_presets import CAMERA_PRESETS, camera_preset
 
 EPILOG = (
     'Topics are remapped and parameters set as for every node: '
@@ -37,7 +39,32 @@ class SourceArguments:
         return flags
 
 
-def parse_arguments(arguments: Sequence[str]) -> SourceArguments:
+@dataclass(frozen=True, slots=True)
+class NodeArguments:
+    """The node's command line without its ROS part.
+
+    Args:
+        sources: Where keypoints come from.
+        camera: Preset of a camera driver whose topics are read, or None.
+    """
+
+    sources: SourceArguments
+    camera: str | None = None
+
+    def as_remappings(self) -> list[str]:
+        """Return the ROS arguments that connect the inputs to the camera's topics.
+
+        Raises:
+            CameraPresetError: If there is no such camera.
+        """
+        if self.camera is None:
+            return []
+        topics = camera_preset(self.camera).topics
+        return ['--ros-args', '-r', f'color/image:={topics.color}',
+                '-r', f'depth/image:={topics.depth}', '-r', f'color/camera_info:={topics.info}']
+
+
+def parse_arguments(arguments: Sequence[str]) -> NodeArguments:
     """Return the arguments of a command line without its ROS part; exits with 2 on a bad one."""
     parser = argparse.ArgumentParser(
         prog='pop node', epilog=EPILOG,
@@ -50,5 +77,9 @@ def parse_arguments(arguments: Sequence[str]) -> SourceArguments:
         help='folder of OpenPose files named <stamp_ns>.json, for --keypoints json')
     parser.add_argument(
         '--decoder', metavar='NAME', help='decoder of a network whose outputs do not tell')
+    parser.add_argument(
+        '--camera', choices=sorted(CAMERA_PRESETS),
+        help='read the topics of this driver; remappings given beside it win')
     found = parser.parse_args(arguments)
-    return SourceArguments(found.keypoints, found.keypoints_dir, found.decoder)
+    sources = SourceArguments(found.keypoints, found.keypoints_dir, found.decoder)
+    return NodeArguments(sources, found.camera)

@@ -1,0 +1,62 @@
+"""Start the node for a camera, and rviz2 if asked for.
+
+ros2 launch pop_ros pop.launch.py camera:=realsense keypoints:=/path/to/network.onnx rviz:=true
+"""
+
+from pathlib import Path
+
+from ament_index_python.packages import get_package_share_directory
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, SetEnvironmentVariable
+from launch.conditions import IfCondition
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+
+from launch import LaunchContext, LaunchDescription
+from pop_ros.camera_presets import CAMERA_PRESETS, camera_preset
+
+SHARE = Path(get_package_share_directory('pop_ros'))
+ARGUMENTS = {
+    'camera': ('realsense', f'driver whose topics are read: {", ".join(CAMERA_PRESETS)}'),
+    'color': ('', 'colour topic, if not that of the driver'),
+    'depth': ('', 'registered depth topic, if not that of the driver'),
+    'info': ('', 'CameraInfo topic of colour, if not that of the driver'),
+    'keypoints': ('depth', 'json, depth or the path of an ONNX network'),
+    'keypoints_dir': ('', 'folder of <stamp_ns>.json files, for keypoints:=json'),
+    'decoder': ('', 'decoder of a network whose outputs do not tell'),
+    'params_file': (str(SHARE / 'config' / 'pop.yaml'), 'file of parameters'),
+    'rviz': ('false', 'whether to start rviz2'),
+    'large_data': ('true', 'whether to use shared memory that holds images (Fast DDS)'),
+}
+
+
+def start_node(context: LaunchContext) -> list[Node]:
+    """Return the node, its topics taken from the preset and overridden by name."""
+    given = {name: LaunchConfiguration(name).perform(context) for name in ARGUMENTS}
+    topics = camera_preset(given['camera']).topics
+    flags = ['--keypoints', given['keypoints']]
+    if given['keypoints_dir']:
+        flags += ['--keypoints-dir', given['keypoints_dir']]
+    if given['decoder']:
+        flags += ['--decoder', given['decoder']]
+    return [Node(
+        package='pop_ros', executable='pop_node', name='pop', output='screen', arguments=flags,
+        parameters=[given['params_file']],
+        remappings=[
+            ('color/image', given['color'] or topics.color),
+            ('depth/image', given['depth'] or topics.depth),
+            ('color/camera_info', given['info'] or topics.info),
+        ])]
+
+
+def generate_launch_description() -> LaunchDescription:
+    """Return arguments, node and rviz2."""
+    declared = [DeclareLaunchArgument(name, default_value=value, description=about)
+                for name, (value, about) in ARGUMENTS.items()]
+    profile = SetEnvironmentVariable(
+        'FASTRTPS_DEFAULT_PROFILES_FILE', str(SHARE / 'config' / 'fastdds_large_data.xml'),
+        condition=IfCondition(LaunchConfiguration('large_data')))
+    rviz = Node(
+        package='rviz2', executable='rviz2', name='rviz2',
+        arguments=['-d', str(SHARE / 'rviz' / 'pop.rviz')],
+        condition=IfCondition(LaunchConfiguration('rviz')))
+    return LaunchDescription([*declared, profile, OpaqueFunction(function=start_node), rviz])
