@@ -24,6 +24,7 @@ from benchmarks.accuracy_methods import (
     Pipeline,
     RetrievalOnly,
 )
+from benchmarks.accuracy_paper import paper_subset, paper_table
 from benchmarks.accuracy_records import match, person_record
 from benchmarks.accuracy_summary import coverage_lines, group_lines, summarise, table
 from pop_core.body.default_body import default_body
@@ -64,6 +65,7 @@ def run(argv: list[str]) -> int:
     entries = [cache.done[seed] for seed in seeds]
     report = summary_of(entries, list(methods))
     print_report(report, console)
+    console.print(paper_table(paper_subset(entries, MAIN)))
     for line in group_lines(people_of(entries, MAIN)):
         console.print(line)
     if options.json is not None:

@@ -8,6 +8,7 @@ from rich.console import Console
 from benchmarks import accuracy, accuracy_cache
 from benchmarks.__main__ import main, runnable
 from benchmarks.accuracy_methods import GivenDetections, Guess, place_mean_body
+from benchmarks.accuracy_paper import paper_subset, paper_table
 from benchmarks.accuracy_pictures import curves_picture, scene_picture
 from benchmarks.accuracy_records import CURVE_M, match, observed_points, person_record
 from benchmarks.accuracy_summary import (
@@ -146,6 +147,19 @@ def test_coverage_counts_joints_inside_their_ellipsoids():
                          record_of(0.02, squared=50.0), record_of(0.02, squared=0.1)])
     assert summary['coverage']['visible'] == {'68': 0.5, '95': 0.75, 'n': 96}
     assert 'visible: 50 % in the 68 % ellipsoid' in coverage_lines(summary)[0]
+
+
+def test_the_papers_table_takes_the_most_hidden_person_of_eighteen_frames():
+    people = [{'found': True, 'hidden_share': 0.2, 'err_pose': 0.5},
+              {'found': True, 'hidden_share': 0.5, 'err_pose': 0.1},
+              {'found': False, 'hidden_share': 0.9}]
+    subset = paper_subset([{'methods': {'pop': {'people': people}}}] * 25, 'pop')
+    assert [record['err_pose'] for record in subset] == [0.1] * 18
+    console = Console(width=130, record=True, file=open('/dev/null', 'w'))  # noqa: SIM115,PTH123
+    console.print(paper_table(subset))
+    text = console.export_text()
+    assert '0.1515' in text
+    assert '0.1000' in text
 
 
 def test_groups_tell_which_poses_fail():
