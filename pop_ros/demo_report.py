@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -14,8 +13,8 @@ from pop_ros.report import Report
 
 LEAD = (
     'A synthetic person walks behind a table. A ROS 2 node in its own process received the '
-    'recording over DDS and published a mesh, joints and points for every frame; what you see '
-    'was read back from the bag of its outputs.')
+    'recording over DDS and published a mesh, joints and points for every frame it had time '
+    'for; what you see was read back from the bag of its outputs.')
 LEGEND = (
     'Left to right, top to bottom: colour, depth, the fitted mesh with its skeleton (hollow '
     'joints are hidden from the camera; the outline is what was segmented), and the scene from '
@@ -63,15 +62,9 @@ def _caption(frame: DemoFrame) -> str:
 
 
 def _commands(paths: DemoPaths) -> list[str]:
-    source = f'--keypoints json --keypoints-dir {_short(paths.keypoints)}'
+    source = f'--keypoints json --keypoints-dir {paths.keypoints.name}'
     return [
-        f'pop replay {_short(paths.camera_bag)} {source} --every-frame --out again_bag',
-        f'ros2 bag play {_short(paths.bodies_bag)}    # and rviz2 beside it',
+        f'cd {paths.root.resolve()}',
+        f'pop replay {paths.camera_bag.name} {source} --every-frame --out bodies_again',
+        f'ros2 bag play {paths.bodies_bag.name}    # with rviz2 beside it',
     ]
-
-
-def _short(path: Path) -> str:
-    try:
-        return str(path.resolve().relative_to(Path.cwd()))
-    except ValueError:
-        return str(path)
