@@ -28,8 +28,8 @@ from pop_core.rgbd import RgbdFrame
 from pop_core.settings import setting
 
 SMALLEST, LARGEST = 0.5, 1.15  # people relative to the default body
-# Standard deviations, and metres, within which a joint lies behind a surface.
-GATE, LARGEST_GATE_M = 2.5, 0.25
+# A joint lies behind a surface within some standard deviations, and within bounds in metres.
+GATE, GATE_BOUNDS_M = 2.5, (0.08, 0.25)
 VGA_WIDTH = 640
 
 
@@ -40,7 +40,7 @@ class LiftingConfig:
     min_score: float = setting(
         0.1, minimum=0.0, maximum=1.0, about='Keypoints of a lower score count as undetected.')
     patch_radius_m: float = setting(
-        0.045, unit='m', minimum=0.005, maximum=0.15,
+        0.05, unit='m', minimum=0.005, maximum=0.15,
         about='Radius of the patch of depth read around a keypoint, at the person.')
     layer_gap: float = setting(
         0.025, minimum=0.005, maximum=0.2,
@@ -52,7 +52,7 @@ class LiftingConfig:
         0.0025, unit='1/m', minimum=0.0, maximum=0.05,
         about='Depth noise divided by squared depth; 0.0025 is 1 cm at 2 m.')
     stretch: float = setting(
-        1.2, minimum=1.0, maximum=2.0,
+        1.25, minimum=1.0, maximum=2.0,
         about='Longest bone accepted, relative to the mean bone of a body of that size.')
     doubt_m: float = setting(
         0.25, unit='m', minimum=0.0, maximum=1.0,
@@ -187,7 +187,7 @@ def _states(
     at_layer, sigma_m = joints.depth_m[rows, chosen], joints.sigma_m[rows, chosen]
     present = joints.layers.present
     with np.errstate(invalid='ignore'):
-        fits = np.abs(depth_m - at_layer) <= np.minimum(GATE * sigma_m, LARGEST_GATE_M)
+        fits = np.abs(depth_m - at_layer) <= np.clip(GATE * sigma_m, *GATE_BOUNDS_M)
         nearer = np.any(present & (joints.depth_m < depth_m[:, None]), axis=1)
     state = np.where(nearer, int(LiftState.OCCLUDED), int(LiftState.OUTLIER))
     state = np.where(fits, int(LiftState.VISIBLE), state)

@@ -65,10 +65,21 @@ def _keep_layer(z, weight, mine, members, total, layers, kept):
         place = np.argmin(layers[:, 1])
         if layers[place, 1] >= share / total:
             return kept
-    m = len(members)
-    layers[place, 0] = z[members[m // 2]]
+    # Quantiles by weight: on the floor around an ankle, the middle of the patch is what counts.
+    below = 0.0
+    first, middle, third = np.nan, np.nan, np.nan
+    for i in members:
+        below += weight[i] / share
+        if np.isnan(first) and below >= 0.25:
+            first = z[i]
+        if np.isnan(middle) and below >= 0.5:
+            middle = z[i]
+        if below >= 0.75:
+            third = z[i]
+            break
+    layers[place, 0] = middle
     layers[place, 1] = share / total
-    layers[place, 2] = 0.5 * (z[members[(3 * m) // 4]] - z[members[m // 4]]) * 1.4826
+    layers[place, 2] = 0.5 * (third - first) * 1.4826
     layers[place, 3] = own / share
     return min(kept + 1, MAX_LAYERS)
 

@@ -9,7 +9,7 @@ from pop_core.body.joints import SHARED_INDEX, SHARED_MIRROR
 from pop_core.keypoints.lifted_joints import LiftState
 from pop_core.keypoints.skeleton import BONE_M, HIPS, LIMB_ENDS, TREE_PARENT
 
-SLACK_M = 0.1  # keypoint and depth errors of both ends
+SLACK_M = 0.12  # keypoint and depth errors of both ends
 SHORTEST = 0.4  # of a limb's bone, relative to the mean: shorter ones are noise at best
 ONE_PLACE_M = 0.06  # left and right limbs nearer than this are one limb seen twice
 GUESSED_NOSE_SCORE, FROM_BEHIND = 0.5, -0.3
