@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -24,6 +24,7 @@ from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.keypoints.lifting import lift_keypoints
 from pop_core.rendering.depth_renderer import render_depth
 from pop_core.retrieval.candidate import PoseCandidate
+from pop_core.retrieval.outliers import reject_outliers
 from pop_core.retrieval.pose_library import PoseLibrary
 from pop_core.retrieval.pose_prior import PosePrior, load_pose_prior
 from pop_core.retrieval.retrieve import retrieve
@@ -33,6 +34,21 @@ from pop_core.segmentation.ground import Ground, find_ground
 from pop_core.stopwatch import Stopwatch
 
 SUPPORT_M = 0.08  # measured and rendered depth agree within clothes and a small misfit
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """A frame and what is already known of it when the next person is fitted.
+
+    Args:
+        frame: The undistorted frame.
+        ground: The floor, if one is seen.
+        taken: Pixels that the people fitted so far explain.
+    """
+
+    frame: RgbdFrame
+    ground: Ground | None
+    taken: Bool[np.ndarray, 'h w']
 
 
 class BodyPipeline:
@@ -76,44 +92,47 @@ class BodyPipeline:
     ) -> tuple[list[BodyEstimate], list[EstimateStatus]]:
         """Fit one person after the other, nearest first, each an occluder of the next."""
         with watch.step('lift'):
-            lifted = [lift_keypoints(frame, d, self.config.lifting) for d in detections]
+            lifted = [self._lift(frame, detection) for detection in detections]
         distance_m = [_distance_m(joints) for joints in lifted]
         with watch.step('ground'):
             ground = find_ground(frame) if self.config.use_ground else None
         statuses = [self._admit(j, z) for j, z in zip(lifted, distance_m, strict=True)]
+        scene = Scene(frame, ground, np.zeros(frame.depth_m.shape, dtype=bool))
         bodies: list[BodyEstimate] = []
-        taken = np.zeros(frame.depth_m.shape, dtype=bool)
         for i in np.argsort(distance_m, kind='stable'):
             if statuses[i] is not EstimateStatus.OK or len(bodies) >= self.config.max_people:
                 continue
-            estimate, status = self._fit_person(frame, detections[i], lifted[i], taken, ground, watch)
+            estimate, status = self._fit_person(scene, detections[i], lifted[i], watch)
             statuses[i] = status
             if estimate is not None:
                 bodies.append(estimate)
-                taken |= estimate.mask
+                scene = replace(scene, taken=scene.taken | estimate.mask)
         return bodies, statuses
 
     def _fit_person(
         self,
-        frame: RgbdFrame,
+        scene: Scene,
         detection: Detection,
         lifted: LiftedJoints,
-        taken: Bool[np.ndarray, 'h w'],
-        ground: Ground | None,
         watch: Stopwatch,
     ) -> tuple[BodyEstimate | None, EstimateStatus]:
         """Retrieve, fit and segment one person."""
         with watch.step('observe'):
-            observation = observe(frame, lifted, taken, ground, detection.part_labels)
+            observation = observe(
+                scene.frame, lifted, scene.taken, scene.ground, detection.part_labels)
         with watch.step('retrieve'):
-            candidates = self._retrieve(lifted, observation, frame.camera)
+            candidates = self._retrieve(lifted, observation, scene.frame.camera)
         with watch.step('fit'):
             fit = self.fitter.fit(observation, candidates)
         with watch.step('segment'):
-            estimate = self._estimate(frame, fit, ground, taken)
+            estimate = self._estimate(scene, fit)
         if estimate.score < self.config.min_support:
             return None, EstimateStatus.NO_SUPPORT
         return estimate, EstimateStatus.OK
+
+    def _lift(self, frame: RgbdFrame, detection: Detection) -> LiftedJoints:
+        lifted = lift_keypoints(frame, detection, self.config.lifting)
+        return reject_outliers(self.library, lifted, self.config.retrieval)
 
     def _retrieve(
         self, lifted: LiftedJoints, observation: Observation, camera: Camera
@@ -132,20 +151,14 @@ class BodyPipeline:
             self.library, lifted, self.config.retrieval, hides=in_the_open_m, gravity=gravity,
             camera=camera)
 
-    def _estimate(
-        self,
-        frame: RgbdFrame,
-        fit: BodyFit,
-        ground: Ground | None,
-        taken: Bool[np.ndarray, 'h w'],
-    ) -> BodyEstimate:
+    def _estimate(self, scene: Scene, fit: BodyFit) -> BodyEstimate:
         """Return the result of a fit at the frame's full resolution."""
-        parameters = fit.parameters
+        frame, parameters = scene.frame, fit.parameters
         mesh = vertices(self.model, parameters)
         rendered = render_depth(mesh, self.model.f, frame.camera)
-        own = np.isfinite(frame.depth_m) & ~taken
-        if ground is not None:
-            own &= ~ground.floor_pixels(frame.depth_m, frame.camera.ray_grid())
+        own = np.isfinite(frame.depth_m) & ~scene.taken
+        if scene.ground is not None:
+            own &= ~scene.ground.floor_pixels(frame.depth_m, frame.camera.ray_grid())
         mask = segment_body(
             frame.depth_m, rendered, own, frame.camera.fx, self.config.segmentation)
         joints = fit.coarse.joints

@@ -1,7 +1,8 @@
 """Typed settings: one place for default, unit, meaning and bounds of every tunable number.
 
-A stage's config is a frozen dataclass whose fields are made by `setting`. ROS parameters, command
-line flags and the parameter page of the docs are derived from `list_settings`, never written twice.
+A stage's config is a frozen dataclass whose fields are made by `setting`. ROS parameters, flags
+of the command line and the parameter page of the docs are derived from `list_settings`, never
+written twice.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ def setting(
 
 
 def list_settings(config: Any, prefix: str = '') -> Iterator[Setting]:
-    """Yield every setting of a config, nested configs included, with its current value as default."""
+    """Yield every setting of a config and its nested configs, current values as defaults."""
     for field in dataclasses.fields(config):
         value = getattr(config, field.name)
         if dataclasses.is_dataclass(value):

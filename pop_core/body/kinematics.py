@@ -80,7 +80,7 @@ def joints_jacobian(
 def increment(
     parameters: BodyParameters, step: Float[np.ndarray, 'x'], skeleton: PosedSkeleton
 ) -> BodyParameters:
-    """Return parameters moved by a step, rotations turned from the left in their parent's frame."""
+    """Return parameters after a step; rotations turn from the left, in their parent's frame."""
     turned = from_rotvec(step[3:75].reshape(24, 3)) @ skeleton.R_local
     rotvecs = to_rotvec(turned)
     return BodyParameters(

@@ -136,7 +136,7 @@ def shared_points(model: BodyModel) -> AttachedPoints:
     """
     template = model.joint_template[SHARED].copy()
     shapedirs = model.joint_shapedirs[SHARED].copy()
-    head = int(np.flatnonzero(SHARED == JOINT_INDEX['head'])[0])
+    head = int(np.flatnonzero(JOINT_INDEX['head'] == SHARED)[0])
     template[head] = model.v_template[model.nose_vertex]
     shapedirs[head] = model.shapedirs[model.nose_vertex]
     return AttachedPoints(SHARED.copy(), template, shapedirs)

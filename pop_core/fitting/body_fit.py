@@ -237,7 +237,7 @@ class BodyFitter:
     ) -> Pairs:
         points, _ = thin_points(observation, segment, self.config.surface_points)
         toward = match_points(state, visibility, points, scale_m)
-        back = match_vertices(state, observation, visibility, scale_m)
+        back = match_vertices(state, visibility, scale_m)
         # Point to point fades as the kernel shrinks and normals can be trusted.
         tangential = tangential_pairs(toward, 0.3 * scale_m / EARLY_SCALES_M[0])
         return join_pairs([toward, tangential, back])
@@ -279,11 +279,12 @@ class BodyFitter:
     ) -> None:
         """Set each hypothesis's cost: E_depth on common pixels, keypoints and priors beside it."""
         for hypothesis in hypotheses:
-            floor = observation.ground and ground_pairs(
-                hypothesis.state, observation.ground, geman_mcclure_share)
+            floor = None
+            if observation.ground is not None:
+                floor = ground_pairs(hypothesis.state, observation.ground, geman_mcclure_share)
             energy = BodyEnergy(
                 hypothesis.state, observation, hypothesis.belief, self._weights(1.0), floor,
-                geman_mcclure_share)
+                kernel=geman_mcclure_share)
             rest = cost_of(energy.residuals(hypothesis.state, False))
             visibility = see_body(hypothesis.state, observation)
             depth = depth_energy(visibility, observation, segment)

@@ -49,29 +49,26 @@ def match_points(
     if len(facing) == 0 or len(points) == 0:
         return no_pairs()
     distance, nearest = cKDTree(state.vertices[facing]).query(points)
-    return _plane_pairs(state, facing[nearest], points, distance, scale_m, EFFECTIVE_POINTS)
+    kernel = geman_mcclure_weight(distance, scale_m)
+    return _plane_pairs(state, facing[nearest], points, kernel * EFFECTIVE_POINTS)
 
 
-def match_vertices(
-    state: BodyState, observation: Observation, visibility: Visibility, scale_m: float
-) -> Pairs:
+def match_vertices(state: BodyState, visibility: Visibility, scale_m: float) -> Pairs:
     """Pair every visible vertex with the point measured at its pixel."""
     vertex = np.flatnonzero(visibility.sight == Sight.VISIBLE)
     if len(vertex) == 0:
         return no_pairs()
     seen = state.vertices[vertex]
     target = seen * (1 + visibility.gap_m[vertex] / seen[:, 2])[:, None]
-    share = VERTEX_SHARE * EFFECTIVE_POINTS
-    return _plane_pairs(state, vertex, target, visibility.gap_m[vertex], scale_m, share)
+    kernel = geman_mcclure_weight(visibility.gap_m[vertex], scale_m)
+    return _plane_pairs(state, vertex, target, kernel * VERTEX_SHARE * EFFECTIVE_POINTS)
 
 
 def _plane_pairs(
     state: BodyState,
     vertex: Int[np.ndarray, 'n'],
     target: Float[np.ndarray, 'n 3'],
-    distance: Float[np.ndarray, 'n'],
-    scale_m: float,
-    worth: float,
+    worth: Float[np.ndarray, 'n'],
 ) -> Pairs:
     """Return point-to-plane pairs weighted by cos(theta) / sigma^2(z), robustly.
 
@@ -79,16 +76,14 @@ def _plane_pairs(
         state: Body.
         vertex: Vertex of each pair.
         target: Measured point of each pair [m].
-        distance: Distance of each pair [m], seen by the robust kernel.
-        scale_m: Scale of the kernel [m].
-        worth: Number of independent points that all pairs together count for.
+        worth: Robust weight of each pair, times the number of independent points that all pairs
+            together count for.
     """
     normal = state.normals[vertex]
     ray = target / np.linalg.norm(target, axis=1, keepdims=True)
     cosine = np.clip(-np.einsum('nc,nc->n', normal, ray), 0.1, 1.0)
     variance = SKIN_SIGMA_M**2 + sensor_sigma_m(target[:, 2]) ** 2
-    weight = cosine / variance * geman_mcclure_weight(distance, scale_m)
-    return Pairs(vertex, normal, target, weight * (worth / len(vertex)))
+    return Pairs(vertex, normal, target, cosine / variance * worth / len(vertex))
 
 
 def tangential_pairs(pairs: Pairs, share: float) -> Pairs:

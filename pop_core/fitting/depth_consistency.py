@@ -140,7 +140,8 @@ def free_space_pairs(
     large, target = large[known], target[known]
     pull = np.linalg.norm(state.vertices[large] - target, axis=1)
     weight = 0.25 / FREE_SIGMA_M**2 * geman_mcclure_weight(pull, 0.3)
-    sideways = [Pairs(large, np.tile(axis, (len(large), 1)), target, weight) for axis in np.eye(2, 3)]
+    sideways = [
+        Pairs(large, np.tile(axis, (len(large), 1)), target, weight) for axis in np.eye(2, 3)]
     return join_pairs([along, *sideways])
 
 

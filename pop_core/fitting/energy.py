@@ -70,6 +70,7 @@ class BodyEnergy:
         belief: PriorBelief,
         weights: TermWeights,
         pairs: Pairs | None = None,
+        *,
         kernel: Kernel = geman_mcclure_weight,
     ) -> None:
         """Freeze robust weights at `state`: those of a step, or the kernel's own to compare."""
@@ -80,7 +81,7 @@ class BodyEnergy:
             state, lifted, weights.robust_m, kernel)
         self.ray_weight = weights.joints * ray_weight(state, rays, kernel)
 
-    def residuals(self, state: BodyState, jacobian: bool) -> list[Residual]:  # noqa: FBT001
+    def residuals(self, state: BodyState, jacobian: bool) -> list[Residual]:
         """Return every block of residuals at a state."""
         lifted, rays = self.observation.lifted, self.observation.keypoint_rays
         belief, weights = self.belief, self.weights

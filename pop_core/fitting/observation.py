@@ -69,7 +69,7 @@ class Observation:
         camera: Pinhole of the cut-out.
         depth_m: Measured depth [m]; NaN is no measurement.
         rays: (x/z, y/z) of every pixel.
-        own: Pixels that may show this person: measured, not flying, not the floor, nobody else's.
+        own: Pixels that may show this person: measured, no flying pixel, no floor, nobody else.
         labels: Body part per pixel as a joint index, -1 where unknown; None without a part map.
         lifted: Lifted joints of the person.
         keypoint_rays: Rays of the keypoints that were not lifted.
@@ -101,7 +101,8 @@ class Observation:
         """
         uv = np.rint(self.camera.project(p_camera))
         uv = np.where(np.isfinite(uv), uv, -1).astype(np.int64)
-        inside = (uv >= 0).all(axis=1) & (uv < [self.camera.width, self.camera.height]).all(axis=1)
+        u, v = uv.T
+        inside = (u >= 0) & (v >= 0) & (u < self.camera.width) & (v < self.camera.height)
         safe = np.where(inside[:, None], uv, 0)
         depth = self.depth_m[safe[:, 1], safe[:, 0]].astype(np.float64)
         return np.where(inside, depth, np.inf), uv
@@ -136,8 +137,8 @@ def observe(
     rays = camera.ray_grid()
     if ground is not None:
         own &= ~ground.floor_pixels(depth_m, rays)
-    rays_of_keypoints = keypoint_rays(lifted, frame.camera)
-    return Observation(window, camera, depth_m, rays, own, parts, lifted, rays_of_keypoints, ground)
+    of_keypoints = keypoint_rays(lifted, frame.camera)
+    return Observation(window, camera, depth_m, rays, own, parts, lifted, of_keypoints, ground)
 
 
 def keypoint_rays(lifted: LiftedJoints, camera: Camera) -> KeypointRays:

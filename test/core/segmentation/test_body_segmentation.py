@@ -9,7 +9,10 @@ CONFIG = SegmentationConfig()
 EVERY = np.ones(SHAPE, dtype=bool)
 
 
-def scene(body_m: float = 2.0, wall_m: float = 4.0) -> tuple[np.ndarray, RenderedDepth, np.ndarray]:
+Scene = tuple[np.ndarray, RenderedDepth, np.ndarray]
+
+
+def scene(body_m: float = 2.0, wall_m: float = 4.0) -> Scene:
     """A flat body on a wall; the rendered body is two pixels narrower than the real one."""
     truth = np.zeros(SHAPE, dtype=bool)
     truth[10:50, 30:50] = True
