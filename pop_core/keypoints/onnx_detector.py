@@ -13,9 +13,11 @@ from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.network import NetworkDecoder, NetworkSpec, Tensor, TensorSpec
 from pop_core.keypoints.people_selection import PeopleConfig, select_people
 from pop_core.keypoints.personlab import PersonLabDecoder
+from pop_core.keypoints.single_person_heatmap import SinglePersonHeatmapDecoder
 from pop_core.rgbd import RgbdFrame
 
-DECODERS: tuple[type[NetworkDecoder], ...] = (PersonLabDecoder,)
+DECODERS: tuple[type[NetworkDecoder], ...] = (
+    PersonLabDecoder, SinglePersonHeatmapDecoder)
 THREADS = 2
 DTYPES = {'tensor(uint8)': 'uint8', 'tensor(float)': 'float32', 'tensor(float16)': 'float16'}
 
