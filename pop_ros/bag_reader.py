@@ -150,7 +150,9 @@ def _as_cdr(raw: bytes | memoryview, kind: str, *, is_ros2: bool) -> bytes:
 def _files(path: Path) -> list[Path]:
     if not path.exists():
         raise BagError(f'{path}: expected a bag, found nothing there')
-    if path.is_file() or (path / 'metadata.yaml').is_file():
+    # rosbags takes any path that ends in .bag for a ROS 1 file; a folder of that name is ours.
+    named_like_ros1 = path.is_dir() and path.suffix == '.bag'
+    if path.is_file() or ((path / 'metadata.yaml').is_file() and not named_like_ros1):
         return [path]
     found = _storages(path)
     if not found:

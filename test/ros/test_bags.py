@@ -76,6 +76,12 @@ def test_a_rosbag2_file_without_its_folder_is_read_too(tmp_path: Path, suffix: s
             assert len(list(bag.messages([COLOR]))) == 2
 
 
+def test_a_rosbag2_folder_may_be_named_like_a_ros1_bag(tmp_path: Path) -> None:
+    folder = write_bag(tmp_path / 'a.mcap', entries(2)).rename(tmp_path / 'results.bag')
+    with BagReader(folder) as bag:
+        assert len(list(bag.messages([COLOR]))) == 2
+
+
 @pytest.mark.parametrize('suffix', ['.bag', '.mcap'])
 @pytest.mark.parametrize('share', [0.3, 0.6, 0.95])
 def test_a_truncated_bag_gives_the_messages_before_the_cut(
