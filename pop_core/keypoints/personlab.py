@@ -33,7 +33,9 @@ MID_ZERO, MID_STEP = 117.0, 1.3875764608
 SEED_SCORE = 0.5
 PERSON_SCORE = 0.1
 NMS_SHARE = 0.04  # of the input's diagonal, as 40 px of 641 x 481 in the paper's demo
-REFINEMENTS = 2
+# Codes end at 10 px, and the disc of cells that know a keypoint is 32 px wide: two steps, as in
+# the paper, leave elbows 14 cm off.
+REFINEMENTS = 5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,7 +129,8 @@ def decode_people(maps: PersonLabMaps, nms_radius_px: float) -> list[Float[np.nd
             continue
         person = np.zeros((N_KEYPOINTS, 3))
         kernels.grow_person(
-            y, x, j, maps.scores, maps.short, maps.mid, EDGES, maps.stride, person)
+            y, x, j, maps.scores, maps.short, maps.mid, EDGES, maps.stride,
+            REFINEMENTS, person)
         own = np.ones(N_KEYPOINTS, dtype=bool)
         for other in people:
             own &= np.hypot(*(other[:, :2] - person[:, :2]).T) > nms_radius_px

@@ -44,10 +44,11 @@ def refined(y, x, j, short, stride, steps):
 
 
 @njit(cache=True, nogil=True)
-def grow_person(y, x, j, scores, short, mid, edges, stride, out):
+def grow_person(y, x, j, scores, short, mid, edges, stride, steps, out):
     """Fill out (17, 3) with (y, x, score), starting at keypoint j and following mid offsets.
 
-    Mid offsets point from one end of an edge to the other, forward (0) and backward (1).
+    Mid offsets point from one end of an edge to the other, forward (0) and backward (1); each
+    place is then refined by `steps` short offsets.
     """
     h, w = short.shape[:2]
     known = np.zeros(N_KEYPOINTS, dtype=np.bool_)
@@ -65,7 +66,7 @@ def grow_person(y, x, j, scores, short, mid, edges, stride, out):
             column = min(w - 1, max(0, int(np.rint(out[source, 1] / stride))))
             ty = out[source, 0] + mid[row, column, way, 0, e]
             tx = out[source, 1] + mid[row, column, way, 1, e]
-            ty, tx = refined(ty, tx, target, short, stride, 2)
+            ty, tx = refined(ty, tx, target, short, stride, steps)
             row = min(h - 1, max(0, int(np.rint(ty / stride))))
             column = min(w - 1, max(0, int(np.rint(tx / stride))))
             out[target, 0], out[target, 1] = ty, tx
