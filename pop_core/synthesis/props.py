@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float
 
@@ -12,6 +14,7 @@ from pop_core.synthesis.blocks import Block, box, ellipsoid
 from pop_core.synthesis.rooms import any_colour
 
 STRAP_M = 0.16  # from the hand down to the middle of a bag
+BACK_M = 0.05   # from the chest's joint to the skin of the back
 
 
 def draw_prop(
@@ -28,8 +31,10 @@ def draw_prop(
     if kind == 1:
         return _around(hand, rng.uniform(0.06, 0.3, 3), rng)
     chest = JOINT_INDEX['spine3']
-    behind = skeleton.G[chest] @ np.array([0.0, 0.0, -rng.uniform(0.16, 0.22)])
-    return _around(p[chest] + behind, rng.uniform([0.25, 0.35, 0.15], [0.35, 0.5, 0.25]), rng)
+    size_m = rng.uniform([0.25, 0.35, 0.15], [0.35, 0.5, 0.25])
+    away = skeleton.G[chest] @ np.array([0.0, 0.0, -1.0])
+    pack = _around(p[chest] + away * (BACK_M + size_m[2] / 2), size_m, rng)
+    return replace(pack, yaw_rad=float(np.arctan2(-away[0], -away[2])))
 
 
 def _around(
