@@ -3,6 +3,7 @@
 #   make demo     from nothing to pictures of a fitted, half-hidden person
 #   make test     the whole test suite
 #   make check    ruff and mypy
+#   make bench-gate   accuracy and speed on a few scenes against the committed baseline
 #   make docs     write the generated pages of docs/ anew
 #
 # Needs Python 3.10 to 3.13 with venv, and make. Choose another Python with PYTHON=, another place
@@ -15,7 +16,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 SOURCES := $(shell find pop_core pop_ros -type f -not -name '*.pyc') setup.py package.xml
 
-.PHONY: demo test check docs pictures clean
+.PHONY: demo test check bench-gate docs pictures clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.installed
@@ -27,6 +28,9 @@ test: $(VENV)/.tools
 check: $(VENV)/.tools
 	$(BIN)/python -m ruff check .
 	$(BIN)/python -m mypy
+
+bench-gate: $(VENV)/.tools
+	$(BIN)/python -m benchmarks gate
 
 docs: $(VENV)/.tools
 	$(BIN)/python -m scripts.write_docs
