@@ -111,6 +111,8 @@ class FramePairer(Generic[ItemT]):
         self.statistics = PairStatistics()
         self._colors: list[_Waiting[ItemT]] = []
         self._depths: list[_Waiting[ItemT]] = []
+        # Those of used images too: a miss is explained by where depth was, not by what is left.
+        self._depth_stamps: deque[int] = deque(maxlen=MAX_DEPTHS)
 
     def add_color(self, stamp_ns: int, item: ItemT, now_ns: int) -> list[Pair[ItemT]]:
         """Store a colour image that arrived at `now_ns` (any steady clock); return new pairs."""
@@ -123,6 +125,7 @@ class FramePairer(Generic[ItemT]):
     def add_depth(self, stamp_ns: int, item: ItemT, now_ns: int) -> list[Pair[ItemT]]:
         """Store a depth image that arrived at `now_ns`; return new pairs."""
         self.depth_stream.see(stamp_ns)
+        self._depth_stamps.append(stamp_ns)
         kept = [d for d in self._depths
                 if d.stamp_ns != stamp_ns and now_ns - d.arrival_ns <= HOLD_NS]
         self._depths = [*kept, _Waiting(stamp_ns, item, now_ns)][-MAX_DEPTHS:]
@@ -183,5 +186,5 @@ class FramePairer(Generic[ItemT]):
     def _miss(self, color: _Waiting[ItemT]) -> None:
         self._colors.remove(color)
         self.statistics.missed += 1
-        gaps = [abs(d.stamp_ns - color.stamp_ns) for d in self._depths]
+        gaps = [abs(stamp - color.stamp_ns) for stamp in self._depth_stamps]
         self.statistics.missed_gap_ns = min(gaps, default=None)

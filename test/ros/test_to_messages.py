@@ -1,0 +1,142 @@
+"""Messages say what the estimates say, with the image's stamp and frame."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from pop_core.body.default_body import default_body
+from pop_core.body.kinematics import joint_rotations, joints
+from pop_core.body.model import BodyModel, BodyParameters
+from pop_core.body.skinning import vertices
+from pop_core.estimate import BodyEstimate, FrameResult
+from pop_core.geometry.camera import Camera
+from pop_core.rgbd import RgbdFrame
+from pop_ros.body_messages import BodyMessages
+from pop_ros.from_messages import stamp_ns
+from pop_ros.node_config import MeshConfig
+from pop_ros.person_ids import PersonIds
+from pop_ros.to_messages import CLOUD_TYPE, body_poses
+
+CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+STAMP_NS = 1_700_000_000_987_654_321
+
+
+@pytest.fixture(scope='module')
+def model() -> BodyModel:
+    return default_body()
+
+
+@pytest.fixture
+def frame() -> RgbdFrame:
+    rng = np.random.default_rng(2)
+    rgb = rng.integers(0, 256, (48, 64, 3), dtype=np.uint8)
+    depth_m = rng.uniform(1, 4, (48, 64)).astype(np.float32)
+    depth_m[10:14, 20:30] = np.nan
+    return RgbdFrame(rgb, depth_m, CAMERA, STAMP_NS)
+
+
+def body(model: BodyModel, x_m: float = 0.0) -> BodyEstimate:
+    rng = np.random.default_rng(1)
+    parameters = BodyParameters(
+        np.array([x_m, 0.2, 2.5]), np.array([np.pi, 0.1, 0.0]), rng.normal(0, 0.2, (23, 3)),
+        np.zeros(10))
+    mask = np.zeros((48, 64), dtype=bool)
+    mask[8:40, 22:36] = True
+    return BodyEstimate(
+        parameters, vertices(model, parameters), joints(model, parameters),
+        joint_rotations(model, parameters), np.zeros(24, dtype=np.int64),
+        np.tile(np.eye(3) * 1e-4, (24, 1, 1)), mask, 0.9)
+
+
+def result(*bodies: BodyEstimate) -> FrameResult:
+    return FrameResult(bodies, (), {})
+
+
+def test_poses_carry_position_and_orientation_of_every_joint(model: BodyModel) -> None:
+    person = body(model)
+    poses = body_poses(person)
+    for pose, p, R in zip(poses, person.joints, person.joint_rotations, strict=True):
+        q, at = pose.orientation, pose.position
+        assert [at.x, at.y, at.z] == p.tolist()
+        found = Rotation.from_quat([q.x, q.y, q.z, q.w]).as_matrix()
+        np.testing.assert_allclose(found, R, atol=1e-12)
+
+
+def test_every_message_has_stamp_and_frame_of_the_image(
+    model: BodyModel, frame: RgbdFrame
+) -> None:
+    messages = BodyMessages(model, MeshConfig())
+    messages.configure(MeshConfig(lifetime_s=1.0))
+    outputs = dict(messages.build(result(body(model)), frame, 'optical', ('joints', 'cloud')))
+    assert set(outputs) == {'joints', 'cloud'}
+    for message in outputs.values():
+        assert stamp_ns(message.header) == STAMP_NS
+        assert message.header.frame_id == 'optical'
+
+
+def test_the_cloud_holds_each_measured_pixel_of_each_person_once(
+    model: BodyModel, frame: RgbdFrame
+) -> None:
+    people = result(body(model), body(model, x_m=1.5))
+    messages = BodyMessages(model, MeshConfig())
+    (_, cloud), = messages.build(people, frame, 'optical', ('cloud',))
+    points = np.frombuffer(cloud.data.tobytes(), CLOUD_TYPE)
+    mask = people.bodies[0].mask & np.isfinite(frame.depth_m)
+    assert len(points) == 2 * mask.sum() == cloud.width
+    assert cloud.row_step == len(cloud.data)
+    first = points[points['person'] == 0]
+    rows, columns = np.nonzero(mask)
+    np.testing.assert_array_equal(first['z'], frame.depth_m[rows, columns])
+    assert np.array_equal(first['rgb'] & 255, frame.rgb[rows, columns, 2])
+    expected_x = (columns - CAMERA.cx) / CAMERA.fx * frame.depth_m[rows, columns]
+    np.testing.assert_allclose(first['x'], expected_x, rtol=1e-6)
+
+
+def test_a_person_who_leaves_is_deleted_once_and_an_empty_room_is_silent(
+    model: BodyModel, frame: RgbdFrame
+) -> None:
+    messages = BodyMessages(model, MeshConfig())
+    messages.build(result(body(model), body(model, 1.5)), frame, 'optical')
+    gone = messages.build(result(), frame, 'optical')
+    deleted = [m.id for name, m in gone if name == 'mesh']
+    assert sorted(deleted) == [0, 1]
+    assert all(m.action == 2 for name, m in gone if name == 'mesh')
+    assert [len(m.poses) for name, m in gone if name == 'joints'] == [0]
+    assert messages.build(result(), frame, 'optical') == []
+
+
+@pytest.mark.parametrize(('detail', 'triangles'), [('full', 'f'), ('reduced', 'fit_faces')])
+def test_mesh_detail_chooses_the_triangles(
+    model: BodyModel, frame: RgbdFrame, detail: str, triangles: str
+) -> None:
+    messages = BodyMessages(model, MeshConfig(detail=detail))
+    (_, data), = messages.build(result(body(model)), frame, 'optical', ('mesh',))
+    size = getattr(model, triangles).size * 24
+    assert size < len(data) < size + 300
+    # The default shared-memory segment of Fast DDS holds half a megabyte.
+    assert detail == 'full' or len(data) < 250_000
+
+
+def test_without_mesh_the_other_outputs_still_come(model: BodyModel, frame: RgbdFrame) -> None:
+    messages = BodyMessages(model, MeshConfig(detail='off'))
+    names = [name for name, _ in messages.build(result(body(model)), frame, 'optical')]
+    assert 'mesh' not in names
+    assert {'joints', 'cloud'} <= set(names)
+
+
+def test_a_person_keeps_the_id_while_walking_and_the_order_changing() -> None:
+    ids = PersonIds()
+    a, b = np.array([0.0, 0, 2]), np.array([1.0, 0, 3])
+    assert ids.assign(np.array([a, b])) == [0, 1]
+    for _ in range(20):
+        a, b = a + [0.1, 0, 0.02], b - [0.1, 0, 0.02]
+        assert ids.assign(np.array([b, a])) == [1, 0]
+
+
+def test_an_id_is_never_given_again() -> None:
+    ids = PersonIds()
+    here, there = np.array([[0.0, 0, 2]]), np.array([[3.0, 0, 2]])
+    assert ids.assign(here) == [0]
+    assert ids.assign(np.zeros((0, 3))) == []
+    assert ids.assign(here) == [1]
+    assert ids.assign(there) == [2]
