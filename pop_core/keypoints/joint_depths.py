@@ -19,14 +19,15 @@ from pop_core.keypoints.skeleton import LEGS, ORDER, PATH_M, linked
 BIN_M = 0.03
 MAX_BINS = 320
 # Costs are -log likelihoods.
-HIDDEN_COST = 2.5  # a joint behind an occluder; times the score: guesses are often hidden
+# A joint behind an occluder, for keypoints of score 0 and 1: guesses are often hidden.
+HIDDEN_COST_GUESSED, HIDDEN_COST_SURE = 0.4, 2.5
 WRONG_COST = 6.0  # a keypoint that shows no surface its joint could lie behind
 FOREIGN_COST = 4.0  # a surface outside the person's mask
 BROKEN_BONE_COST = 8.0
 OCCLUDER_COST = 2.5  # a surface that stands clear in front of the one it should continue
 OCCLUDER_GAP_M = 0.25
 BONE_TOLERANCE_M = 0.05
-LEAN = 0.45  # spread of a bone's depth relative to its length, over varied poses
+LEAN = 0.6  # spread of a bone's depth relative to its length, over varied poses
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,7 +125,8 @@ def _unary(
     gap = (bins - joints.depth_m[..., None]) / sigma_m[..., None]
     behind = 0.5 * gap**2 + joints.price[..., None]
     # Something nearer than the joint hides it; a surface that fills the patch hides it best.
-    price_hidden = HIDDEN_COST * scores[:, None] - np.log(np.maximum(share, 1e-6))
+    cost = HIDDEN_COST_GUESSED + (HIDDEN_COST_SURE - HIDDEN_COST_GUESSED) * scores
+    price_hidden = cost[:, None] - np.log(np.maximum(share, 1e-6))
     hidden = np.where(gap > 0, price_hidden[..., None], np.inf)
     each = np.where(present[..., None], np.minimum(behind, hidden), np.inf)
     return np.minimum(each.min(axis=1), WRONG_COST) * (0.3 + 0.7 * scores[:, None])
