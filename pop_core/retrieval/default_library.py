@@ -13,7 +13,7 @@ from pop_core.body.default_body import default_body
 from pop_core.body.model import BodyModel
 from pop_core.errors import LibraryFileError
 from pop_core.retrieval.generation import draw_poses
-from pop_core.retrieval.library_file import load_library, read_header, save_library
+from pop_core.retrieval.library_file import load_library, save_library
 from pop_core.retrieval.pose_library import PoseLibrary, build_library, pose_columns
 from pop_core.retrieval.pose_prior import load_pose_prior
 from pop_core.retrieval.procedural.families import DrawnPoses
@@ -38,7 +38,7 @@ def default_library(progress: Progress | None = None, size: int = DEFAULT_SIZE) 
         size: Number of poses.
     """
     model = default_body()
-    path = cache_folder() / f'poses_{size}_{fingerprint(model)}.poplib'
+    path = default_library_path(size)
     try:
         if path.exists():
             return load_library(path, verify=True)
@@ -46,8 +46,12 @@ def default_library(progress: Progress | None = None, size: int = DEFAULT_SIZE) 
         path.unlink()
     library = generate_library(model, size, progress=progress)
     save_library(library, path, {'origin': 'generated: pose prior and procedural families'})
-    read_header(path)
     return load_library(path)
+
+
+def default_library_path(size: int = DEFAULT_SIZE) -> Path:
+    """Return where the default library is cached."""
+    return cache_folder() / f'poses_{size}_{fingerprint(default_body())}.poplib'
 
 
 def generate_library(

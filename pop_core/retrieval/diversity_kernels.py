@@ -10,8 +10,8 @@ from numba import njit
 def cover(points, belief, width, first, chosen, owner):
     """Choose poses one by one so that as much belief as possible lies near a chosen one.
 
-    A pose at mean distance d from a chosen one counts as covered by 1 / (1 + (d / width)^4): all of
-    it within the width, next to nothing at twice the width.
+    A pose at mean distance d from a chosen one counts as covered by 1 / (1 + (d / width)^4): all
+    of it within the width, next to nothing at twice the width.
 
     Args:
         points: Places (n,k,3) [m] of the joints that count.

@@ -1,0 +1,1 @@
+"""Readers of pose collections that users hold: SURREAL, AMASS and other npz, BVH."""
