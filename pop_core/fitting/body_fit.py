@@ -54,10 +54,10 @@ class FittingConfig:
         3, minimum=0, maximum=20,
         about='Steps of the winner on the full mesh.')
     prior_weight: float = setting(
-        0.2, minimum=0.0, maximum=100.0,
+        0.15, minimum=0.0, maximum=100.0,
         about='Weight of the learned pose prior.')
     neighbour_weight: float = setting(
-        0.3, minimum=0.0, maximum=100.0,
+        0.15, minimum=0.0, maximum=100.0,
         about='Weight of the conditional prior: stay near the retrieved pose where all agree.')
     free_space: bool = setting(
         True, about='Whether bodies are pushed out of space the sensor saw through.')

@@ -22,6 +22,8 @@ from pop_core.rendering.depth_renderer import vertex_normals
 TRANSL = slice(0, 3)
 GLOBAL_ORIENT = slice(3, 6)
 BODY_POSE = slice(6, 75)
+CLOTH_M = 0.006  # mean distance of a clothed surface from the skin
+BARE = [JOINT_INDEX[name] for name in ('head', 'left_hand', 'right_hand')]
 SOLE_M = 0.02  # vertices this close to the lowest of a foot belong to its sole
 
 
@@ -41,6 +43,7 @@ class FitBody:
         self.landmarks: AttachedPoints = shared_points(model)
         self.size = 3 + 72 + model.n_betas + 1
         self.main_bone: Int[np.ndarray, 'n'] = self.skinning.bone_ids[:, 0]
+        self.cloth_m = np.where(np.isin(self.main_bone, BARE), 0.0, CLOTH_M)
         self.soles = (self._sole('left'), self._sole('right'))
 
     def state(self, parameters: BodyParameters) -> BodyState:

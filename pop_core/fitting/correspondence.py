@@ -83,7 +83,9 @@ def _plane_pairs(
     ray = target / np.linalg.norm(target, axis=1, keepdims=True)
     cosine = np.clip(-np.einsum('nc,nc->n', normal, ray), 0.1, 1.0)
     variance = SKIN_SIGMA_M**2 + sensor_sigma_m(target[:, 2]) ** 2
-    return Pairs(vertex, normal, target, cosine / variance * worth / len(vertex))
+    # The sensor sees cloth; the body lies under it.
+    skin = target - state.body.cloth_m[vertex, None] * normal
+    return Pairs(vertex, normal, skin, cosine / variance * worth / len(vertex))
 
 
 def tangential_pairs(pairs: Pairs, share: float) -> Pairs:
