@@ -44,7 +44,7 @@ def result_panels(
     Lens distortion is taken out of all of them: meshes are drawn as a pinhole sees them.
     """
     seen = undistort_frame(frame)
-    people = [replace(b, mask=_undistorted(b.mask, frame.camera)) for b in bodies]
+    people = [replace(b, mask=undistorted_mask(b.mask, frame.camera)) for b in bodies]
     overlay = draw_people(seen.rgb, people, f, seen.camera)
     count = len(people)
     return [
@@ -81,7 +81,10 @@ def _points_to_show(
     return np.percentile(cloud, [2.0, 98.0], axis=0)
 
 
-def _undistorted(mask: Bool[np.ndarray, 'h w'], camera: Camera) -> Bool[np.ndarray, 'h w']:
+def undistorted_mask(
+    mask: Bool[np.ndarray, 'h w'], camera: Camera
+) -> Bool[np.ndarray, 'h w']:
+    """Return a mask of the camera's image in the pixels of its pinhole."""
     if not camera.is_distorted:
         return mask
     as_depth = mask.astype(np.float32)
