@@ -6,10 +6,11 @@ import numpy as np
 from jaxtyping import Float
 
 from pop_core.body.joints import COCO_17_NAMES, N_SHARED, SHARED_INDEX
+from pop_core.keypoints.neck import with_smpl_neck
 
 _ROW = {name: row for row, name in enumerate(COCO_17_NAMES)}
 _SAME = tuple(name for name in SHARED_INDEX if name in _ROW)
-# COCO marks neither: OpenPose puts them midway between hips and between shoulders.
+# COCO marks neither: they are taken midway between hips and between shoulders.
 _MIDWAY = {'pelvis': ('left_hip', 'right_hip'), 'neck': ('left_shoulder', 'right_shoulder')}
 
 
@@ -26,4 +27,4 @@ def shared_from_coco17(
         if score > 0:
             shared_px[SHARED_INDEX[name]] = 0.5 * (keypoints_px[a] + keypoints_px[b])
             shared_scores[SHARED_INDEX[name]] = score
-    return shared_px, shared_scores
+    return with_smpl_neck(shared_px), shared_scores

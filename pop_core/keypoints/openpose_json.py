@@ -13,6 +13,7 @@ from jaxtyping import Float
 from pop_core.body.joints import BODY_25_OF_SHARED
 from pop_core.errors import KeypointFileError
 from pop_core.keypoints.detection import Detection
+from pop_core.keypoints.neck import with_detector_neck, with_smpl_neck
 from pop_core.keypoints.people import detection_of
 from pop_core.rgbd import RgbdFrame
 
@@ -83,7 +84,8 @@ def read_openpose_json(path: Path) -> list[Detection]:
         rows = _body_25(person, f'{path}: person {number}')
         shared = rows[BODY_25_OF_SHARED]
         if np.any(shared[:, 2] > 0):
-            detections.append(detection_of(shared[:, :2], shared[:, 2]))
+            found = detection_of(shared[:, :2], shared[:, 2])
+            detections.append(detection_of(with_smpl_neck(found.keypoints_px), found.scores))
     return sorted(detections, key=lambda person: -person.score)
 
 
@@ -93,7 +95,8 @@ def write_openpose_json(path: Path, detections: Sequence[Detection]) -> None:
     for detection in detections:
         rows = np.zeros((N_BODY_25, 3))
         found = detection.scores > 0
-        shared = np.column_stack([detection.keypoints_px, detection.scores])
+        uv = with_detector_neck(detection.keypoints_px)
+        shared = np.column_stack([uv, detection.scores])
         rows[BODY_25_OF_SHARED[found]] = shared[found]
         people.append({'person_id': [-1], 'pose_keypoints_2d': rows.ravel().round(4).tolist()})
     path.write_text(json.dumps({'version': 1.3, 'people': people}) + '\n', encoding='utf-8')

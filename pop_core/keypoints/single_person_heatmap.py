@@ -15,12 +15,13 @@ from jaxtyping import Float, Float32, UInt8
 from pop_core.body.joints import N_SHARED, SHARED_INDEX
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.letterbox import letterbox
+from pop_core.keypoints.neck import with_smpl_neck
 from pop_core.keypoints.network import NetworkSpec, Run
 from pop_core.keypoints.people import detection_of
 
 MEAN, STD = np.array([0.485, 0.456, 0.406]), np.array([0.229, 0.224, 0.225])
 # Channels in order. MPII marks no nose, so the head stays undetected; its thorax lies between the
-# shoulders, where OpenPose puts the neck.
+# shoulders, as other detectors' neck.
 CHANNELS = (
     'head_top', 'upper_neck', 'right_shoulder', 'right_elbow', 'right_wrist', 'neck',
     'left_shoulder', 'left_elbow', 'left_wrist', 'pelvis', 'right_hip', 'right_knee',
@@ -91,7 +92,7 @@ class SinglePersonHeatmapDecoder:
                 scores[SHARED_INDEX[name]] = min(1.0, float(peaks[channel]))
         if np.count_nonzero(scores) < MIN_KEYPOINTS:
             return None
-        return detection_of(shared_px, scores)
+        return detection_of(with_smpl_neck(shared_px), scores)
 
 
 def heatmap_peaks(

@@ -8,11 +8,10 @@ from jaxtyping import Bool, Float, Int
 from pop_core.body.joints import SHARED_INDEX
 
 ROOT = 'pelvis'
-# (joint, parent, mean length [m]); parents before children. The head's bone ends at the nose and
-# is 4 cm longer than the body's: detectors put the neck between the shoulders, SMPL above them.
+# (joint, parent, mean length [m]); the head's bone ends at the nose. Parents before children.
 BONES = (
     ('neck', ROOT, 0.541),
-    ('head', 'neck', 0.222),
+    ('head', 'neck', 0.182),
     ('left_hip', ROOT, 0.113),
     ('right_hip', ROOT, 0.113),
     ('left_shoulder', 'neck', 0.200),

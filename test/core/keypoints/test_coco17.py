@@ -16,7 +16,7 @@ def test_named_joints_are_copied_and_the_nose_stands_for_the_head():
     assert shared_scores[SHARED_INDEX['head']] == scores[ROW['nose']]
 
 
-def test_pelvis_and_neck_lie_midway_and_are_as_sure_as_the_worse_side():
+def test_pelvis_and_neck_are_as_sure_as_the_worse_side():
     uv, scores = np.zeros((17, 2)), np.full(17, 0.9)
     uv[ROW['left_hip']], uv[ROW['right_hip']] = (10.0, 4.0), (20.0, 8.0)
     scores[ROW['right_hip']] = 0.3

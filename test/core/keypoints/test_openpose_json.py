@@ -54,7 +54,7 @@ def test_each_body_25_row_lands_on_its_joint(tmp_path):
     # BODY_25: 0 nose, 1 neck, 2-4 right arm, 5-7 left arm, 8 mid hip, 9-11 right leg, 12-14 left.
     rows = np.column_stack([np.arange(25) + 100.0, np.arange(25) + 200.0, np.full(25, 0.5)])
     person = read_openpose_json(write(tmp_path / 'k.json', rows.ravel().tolist()))[0]
-    expected = {'head': 0, 'neck': 1, 'right_wrist': 4, 'left_elbow': 6, 'pelvis': 8,
+    expected = {'head': 0, 'right_wrist': 4, 'left_elbow': 6, 'pelvis': 8,
                 'right_hip': 9, 'right_ankle': 11, 'left_knee': 13}
     for name, row in expected.items():
         assert person.keypoints_px[SHARED_INDEX[name]].tolist() == [100.0 + row, 200.0 + row]

@@ -55,7 +55,7 @@ def test_joints_come_back_in_pixels_of_the_image_without_a_head():
     decoder = SinglePersonHeatmapDecoder(spec_of((1, 368, 368, 16)))
     (person,) = decoder.detect(np.zeros((736, 736, 3), np.uint8), lambda _: [heat[None]])
     for channel, name in enumerate(CHANNELS):
-        if name in SHARED_INDEX:
+        if name in SHARED_INDEX and name != 'neck':
             expected = (places[channel] + 0.5) * 2 - 0.5
             np.testing.assert_allclose(
                 person.keypoints_px[SHARED_INDEX[name]], expected, atol=1.0)
