@@ -22,12 +22,14 @@ class Similarities:
         R: Rotation (no reflection).
         t: Translation [m].
         residual_m: Weighted RMS distance after the transform [m].
+        lean_cost: Price of leaning [m^2], in the units of the squared residual.
     """
 
     scale: Float[np.ndarray, 'n']
     R: Float[np.ndarray, 'n 3 3']
     t: Float[np.ndarray, 'n 3']
     residual_m: Float[np.ndarray, 'n']
+    lean_cost: Float[np.ndarray, 'n']
 
     def apply(self, points: Float[np.ndarray, 'n k 3']) -> Float[np.ndarray, 'n k 3']:
         """Return the transformed points of each pose [m]."""
@@ -42,6 +44,7 @@ def solve_similarities(
     scale_limits: tuple[float, float],
     *,
     yaw_only: bool = False,
+    upright: float = 0.0,
 ) -> Similarities:
     """Return the weighted similarity that maps each set of points onto the target (Eq. 1).
 
@@ -55,19 +58,23 @@ def solve_similarities(
         weight: Positive weights; only their ratios matter.
         scale_limits: Smallest and largest scale.
         yaw_only: Restrict rotations to turns about y.
+        upright: Price [m^2] per unit of scale * |y - R y|^2 in the mean squared distance: makes
+            rotations prefer turns about y.
     """
     w = weight / weight.sum()
     centre = np.einsum('k,nkc->nc', w, points)
     middle = w @ target
     p, q = points - centre[:, None], target - middle
     cross = np.einsum('k,kr,nkc->nrc', w, q, p)
-    R = _best_yaw(cross) if yaw_only else _best_rotation(cross)
+    pull = upright * np.outer([0.0, 1.0, 0.0], [0.0, 1.0, 0.0])
+    R = _best_yaw(cross) if yaw_only else _best_rotation(cross + pull)
     reach = np.einsum('nrc,nrc->n', R, cross)
     own = np.einsum('k,nkc->n', w, p**2)
-    scale = np.clip(reach / np.maximum(own, 1e-12), *scale_limits)
+    lean = upright * (1.0 - R[:, 1, 1])
+    scale = np.clip((reach - lean) / np.maximum(own, 1e-12), *scale_limits)
     cost = w @ np.sum(q**2, axis=1) + scale * (scale * own - 2.0 * reach)
     t = middle - scale[:, None] * np.einsum('nrc,nc->nr', R, centre)
-    return Similarities(scale, R, t, np.sqrt(np.maximum(cost, 0.0)))
+    return Similarities(scale, R, t, np.sqrt(np.maximum(cost, 0.0)), 2.0 * scale * lean)
 
 
 def rank_similarities(
@@ -77,9 +84,10 @@ def rank_similarities(
     scale_limits: tuple[float, float],
     *,
     yaw_only: bool = False,
+    upright: float = 0.0,
     threads: int = 2,
 ) -> Float32[np.ndarray, 'm']:
-    """Return the weighted mean squared distance [m^2] of every pose after its best similarity.
+    """Return the mean squared distance [m^2], and the price of leaning, of every pose.
 
     Single precision, good to a millimetre: a first ranking whose best `solve_similarities`
     settles.
@@ -90,6 +98,7 @@ def rank_similarities(
         weight: Weights, zero for joints that were not measured.
         scale_limits: Smallest and largest scale.
         yaw_only: Restrict rotations to turns about y.
+        upright: Price of leaning as in `solve_similarities`.
         threads: Most threads to use.
     """
     chosen = np.flatnonzero(weight > 0)
@@ -97,7 +106,7 @@ def rank_similarities(
     centred = target[chosen] - w @ target[chosen]
     arguments = (
         chosen, centred.astype(np.float32), w.astype(np.float32),
-        np.asarray(scale_limits, dtype=np.float32), yaw_only,
+        np.asarray(scale_limits, dtype=np.float32), yaw_only, np.float32(upright),
     )
     m = columns.shape[2]
     out = np.empty(m, dtype=np.float32)

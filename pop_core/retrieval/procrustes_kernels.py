@@ -18,7 +18,7 @@ SQRT3 = np.float32(1.7320508)
 
 @njit(cache=True, nogil=True, fastmath=True)
 def similarity_costs(
-    columns, chosen, target, weight, limits, yaw_only, out, first, last
+    columns, chosen, target, weight, limits, yaw_only, upright, out, first, last
 ):
     """Fill out[first:last] with weighted mean squared distances [m^2] after the best similarity.
 
@@ -29,6 +29,7 @@ def similarity_costs(
         weight: Weights (n) float32 that sum to one.
         limits: Smallest and largest scale (2) float32.
         yaw_only: Whether rotations are restricted to turns about y.
+        upright: Cost [m^2] per unit of scale * |y - R y|^2: the price of leaning.
         out: Costs (m) float32.
         first: First pose.
         last: One past the last pose.
@@ -65,18 +66,21 @@ def similarity_costs(
         if yaw_only:
             _yaw_costs(sums, size, spread, limits, out[start:])
         else:
-            _free_costs(sums, size, spread, limits, out[start:])
+            _free_costs(sums, size, spread, limits, upright, out[start:])
     return out
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def _free_costs(sums, size, spread, limits, out):
-    """Fill costs of rotations of any axis."""
+def _free_costs(sums, size, spread, limits, upright, out):
+    """Fill costs of rotations of any axis.
+
+    The price of leaning is one more correspondence, y to y, in the cross-covariance.
+    """
     tiny, one, two = np.float32(1e-12), np.float32(1.0), np.float32(2.0)
     for i in range(size):
         own = sums[3, i] - sums[0, i] ** 2 - sums[1, i] ** 2 - sums[2, i] ** 2
         a, b, c = sums[4, i], sums[5, i], sums[6, i]
-        d, e, f = sums[7, i], sums[8, i], sums[9, i]
+        d, e, f = sums[7, i], sums[8, i] + upright, sums[9, i]
         g, h, k = sums[10, i], sums[11, i], sums[12, i]
         norm2 = a * a + b * b + c * c + d * d + e * e + f * f + g * g + h * h + k * k + tiny
         p, q, r = e * k - f * h, f * g - d * k, d * h - e * g
@@ -96,7 +100,7 @@ def _free_costs(sums, size, spread, limits, out):
             value = (x2 - two) * x2 + c1 * x + c0
             slope = np.float32(4.0) * x * (x2 - one) + c1
             x = x - value / (slope + np.float32(1e-6))
-        reach = x * norm
+        reach = x * norm - upright
         scale = min(max(reach / (own + tiny), limits[0]), limits[1])
         out[i] = max(spread + scale * (scale * own - two * reach), np.float32(0.0))
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypedDict
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
@@ -27,7 +28,15 @@ from pop_core.retrieval.procrustes import (
 from pop_core.settings import setting
 
 Hides = Callable[[Float[np.ndarray, 'n 3']], Float[np.ndarray, 'n']]
+
 MIN_JOINTS = 3  # fewer points leave a turn about their line undecided
+
+
+class RotationRules(TypedDict):
+    """Keyword arguments of Eq. (1)'s solvers."""
+
+    yaw_only: bool
+    upright: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +63,9 @@ class RetrievalConfig:
         0.5, minimum=0.2, maximum=1.0, about='Smallest person, in sizes of the library body.')
     largest_scale: float = setting(
         1.25, minimum=1.0, maximum=2.0, about='Largest person, in sizes of the library body.')
+    lean_sigma_deg: float = setting(
+        10.0, unit='deg', minimum=0.0, maximum=90.0,
+        about='Where gravity is known: how far poses may lean from upright; 0 allows turns only.')
     same_visibility: bool = setting(
         False, about='Only poses recorded with the same visible joints, as in the paper.')
     threads: int = setting(2, minimum=1.0, maximum=64.0, about='Threads of the search.')
@@ -76,8 +88,8 @@ def retrieve(
         config: Settings.
         hides: How far [m] points of the camera frame stand in the open, in front of the measured
             surface; 0 where the scene can hide them. None: nothing is known.
-        gravity: Direction of gravity in the camera frame; rotations are then restricted to turns
-            about it. None: any rotation.
+        gravity: Direction of gravity in the camera frame; poses then stand as they do in the
+            library, give or take `lean_sigma_deg`. None: any rotation.
         camera: Gives the rays of hidden joints that have a pixel. None: rays are not used.
 
     Returns:
@@ -90,14 +102,15 @@ def retrieve(
     weight = np.zeros(len(seen))
     weight[seen] = 1.0 / (lifted.sigma_m[seen] ** 2 + config.pose_sigma_m**2)
     R_camera_up = _upright_frame(gravity)
-    yaw_only = gravity is not None
-    shortlist = _shortlist(library, lifted, weight, config, R_camera_up, yaw_only=yaw_only)
+    rules = _rotation_rules(gravity is not None, weight, config)
+    shortlist = _shortlist(library, lifted, weight, config, R_camera_up, rules)
     joints = np.asarray(library.joints[shortlist], dtype=np.float64)
     placed = solve_similarities(
         joints[:, seen], lifted.positions_camera[seen] @ R_camera_up, weight[seen],
-        (config.smallest_scale, config.largest_scale), yaw_only=yaw_only)
+        (config.smallest_scale, config.largest_scale), **rules)
     joints_camera = placed.apply(joints) @ R_camera_up.T
-    energy = placed.residual_m**2 * weight.sum() - 2.0 * np.log(library.weights[shortlist])
+    energy = (placed.residual_m**2 + placed.lean_cost) * weight.sum()
+    energy -= 2.0 * np.log(library.weights[shortlist])
     energy += hidden_energy(joints_camera, lifted, config, hides, camera)
     chosen, belief = choose_diverse(joints_camera, energy, ~seen, config)
     return [
@@ -181,20 +194,32 @@ def _shortlist(
     weight: Float[np.ndarray, 's'],
     config: RetrievalConfig,
     R_camera_up: Float[np.ndarray, '3 3'],
-    *,
-    yaw_only: bool,
+    rules: RotationRules,
 ) -> Int[np.ndarray, 'k']:
     """Return the best poses by Eq. (1), best first."""
     costs: Float32[np.ndarray, 'm'] = rank_similarities(
         library.columns, lifted.positions_camera @ R_camera_up, weight,
         (config.smallest_scale, config.largest_scale),
-        yaw_only=yaw_only, threads=config.threads)
+        threads=config.threads, **rules)
     if config.same_visibility:
         same = library.masks == visibility_mask(lifted.lifted)
         if same.any():
             costs[~same] = np.inf
     best = best_indices(costs, config.shortlist)
     return best[np.isfinite(costs[best])]
+
+
+def _rotation_rules(
+    known_gravity: bool, weight: Float[np.ndarray, 's'], config: RetrievalConfig
+) -> RotationRules:
+    """Return how rotations are restricted."""
+    sigma = np.deg2rad(config.lean_sigma_deg)
+    if not known_gravity:
+        return {'yaw_only': False, 'upright': 0.0}
+    if sigma == 0.0:
+        return {'yaw_only': True, 'upright': 0.0}
+    # (angle / sigma)^2 in the energy, which is the mean squared distance times the weights' sum.
+    return {'yaw_only': False, 'upright': float(1.0 / (sigma**2 * weight.sum()))}
 
 
 def _upright_frame(gravity: Float[np.ndarray, '3'] | None) -> Float[np.ndarray, '3 3']:

@@ -94,6 +94,26 @@ def test_yaw_search_refuses_to_lay_people_down():
     assert _rank(points, turned, weight, yaw_only=True)[4] < 1e-6
 
 
+def test_the_price_of_leaning_is_what_both_solvers_say():
+    points = cloud(300)
+    target = points[3] @ from_rotvec(np.array([0.3, 0.8, -0.2])).T + [0.0, 0.0, 2.0]
+    weight = np.ones(15)
+    exact = solve_similarities(points, target, weight, LIMITS, upright=0.05)
+    fast = _rank(points, target, weight, upright=0.05)
+    assert np.allclose(np.sqrt(fast), np.sqrt(exact.residual_m**2 + exact.lean_cost), atol=1e-3)
+    up = exact.R[:, :, 1] - [0.0, 1.0, 0.0]
+    assert np.allclose(exact.lean_cost, 0.05 * exact.scale * np.sum(up**2, axis=1))
+
+
+def test_a_high_price_of_leaning_equals_turns_about_y():
+    points = cloud(5)
+    target = points[1] @ from_rotvec(np.array([0.3, 0.8, -0.2])).T
+    strict = solve_similarities(points, target, np.ones(15), LIMITS, yaw_only=True)
+    dear = solve_similarities(points, target, np.ones(15), LIMITS, upright=1e4)
+    assert np.allclose(strict.R, dear.R, atol=1e-3)
+    assert np.allclose(strict.residual_m, dear.residual_m, atol=1e-3)
+
+
 def test_scale_stays_human():
     points = cloud(3)
     for size, expected in ((0.2, 0.5), (3.0, 1.25)):

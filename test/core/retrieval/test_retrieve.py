@@ -116,13 +116,40 @@ def test_gravity_keeps_people_upright(library):
     fallen = (joints - joints[0]) @ from_rotvec(np.array([0.0, 0.0, 1.3])).T + joints[0]
     down = np.array([0.0, 1.0, 0.0])
     free = retrieve(library, seen_from(fallen))[0]
-    held = retrieve(library, seen_from(fallen), gravity=down)
+    strict = RetrievalConfig(lean_sigma_deg=0.0)
+    held = retrieve(library, seen_from(fallen), strict, gravity=down)
     assert free.index == 321
     for candidate in held:
         tilt = from_rotvec(library.tilt[candidate.index].astype(float))
         up = candidate.R_camera_body @ tilt.T @ [0.0, 1.0, 0.0]
         assert np.allclose(up, -down, atol=1e-6)
     assert retrieve(library, seen_from(joints), gravity=down)[0].index == 321
+
+
+def test_known_gravity_forgives_a_small_lean(library):
+    joints = placed(library, 88)
+    R = from_rotvec(np.array([0.0, 0.0, 0.15]))
+    leaned = (joints - joints[0]) @ R.T + joints[0]
+    assert retrieve(library, seen_from(leaned), gravity=np.array([0.0, 1.0, 0.0]))[0].index == 88
+
+
+def test_known_gravity_decides_what_a_trunk_alone_leaves_open(library):
+    down = np.array([0.0, 1.0, 0.0])
+    trunk = {'pelvis', 'neck', 'left_shoulder', 'right_shoulder', 'left_hip', 'right_hip'}
+    hidden = [row for name, row in SHARED_INDEX.items() if name not in trunk]
+
+    def leans(candidates: list) -> np.ndarray:
+        tilts = [from_rotvec(library.tilt[c.index].astype(float)) for c in candidates]
+        up = np.stack([c.R_camera_body @ T.T for c, T in zip(candidates, tilts, strict=True)])
+        return np.arccos(np.clip(up[:, :, 1] @ -down, -1.0, 1.0))
+
+    free, held = [], []
+    for row in range(0, 4000, 400):
+        lifted = seen_from(placed(library, row), hidden)
+        free.append(leans(retrieve(library, lifted)).mean())
+        held.append(leans(retrieve(library, lifted, gravity=down)).mean())
+    assert np.mean(held) < 0.15
+    assert np.mean(free) > 2 * np.mean(held)
 
 
 def test_two_joints_are_not_enough(library):
