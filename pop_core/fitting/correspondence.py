@@ -92,8 +92,9 @@ def tangential_pairs(pairs: Pairs, share: float) -> Pairs:
     """Return the same pairs as point to point, at a share of their weight.
 
     Planes let a limb slide along itself; a weak pull in all directions keeps it from drifting
-    while the pose is still wrong.
+    while the pose is still wrong. Every third pair stands for three: it is a weak, smooth force.
     """
-    axes = [np.tile(axis, (len(pairs.vertex), 1)) for axis in np.eye(3)]
-    return join_pairs(
-        [Pairs(pairs.vertex, axis, pairs.target, pairs.weight * share) for axis in axes])
+    vertex, target = pairs.vertex[::3], pairs.target[::3]
+    weight = 3.0 * share * pairs.weight[::3]
+    axes = [np.tile(axis, (len(vertex), 1)) for axis in np.eye(3)]
+    return join_pairs([Pairs(vertex, axis, target, weight) for axis in axes])

@@ -1,4 +1,4 @@
-"""Numba z-buffer (float32 depth, one thread, no GIL)."""
+"""Numba kernels of meshes: z-buffer (float32 depth) and normals (one thread, no GIL)."""
 
 from __future__ import annotations
 
@@ -47,3 +47,24 @@ def rasterize(vertices, faces, fx, fy, cx, cy, depth, face_id):
                 if z < depth[y, x]:
                     depth[y, x] = z
                     face_id[y, x] = t
+
+
+@njit(cache=True, nogil=True)
+def area_normals(vertices, faces, out):
+    """Fill unit normals (n,3) of vertices, weighted by the area of their triangles."""
+    out[:] = 0.0
+    for t in range(faces.shape[0]):
+        a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+        ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1],
+                      vertices[b, 2] - vertices[a, 2])
+        vx, vy, vz = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1],
+                      vertices[c, 2] - vertices[a, 2])
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        for i in (a, b, c):
+            out[i, 0] += nx
+            out[i, 1] += ny
+            out[i, 2] += nz
+    for i in range(out.shape[0]):
+        length = np.sqrt(out[i, 0] ** 2 + out[i, 1] ** 2 + out[i, 2] ** 2)
+        if length > 1e-12:
+            out[i] /= length

@@ -50,11 +50,8 @@ def vertex_normals(
     vertices: Float[np.ndarray, 'n 3'], f: Int[np.ndarray, 'm 3']
 ) -> Float[np.ndarray, 'n 3']:
     """Return unit normals, outward for outward faces, weighted by the area of their triangles."""
-    a, b, c = (vertices[f[:, k]] for k in range(3))
-    weighted = np.cross(b - a, c - a)
-    normals = np.stack(
-        [np.bincount(f.ravel(), np.repeat(weighted[:, k], 3), len(vertices)) for k in range(3)],
-        axis=1,
-    )
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals / np.maximum(length, 1e-12)
+    out = np.empty((len(vertices), 3))
+    depth_kernels.area_normals(
+        np.ascontiguousarray(vertices, dtype=np.float64),
+        np.ascontiguousarray(f, dtype=np.int64), out)
+    return out
