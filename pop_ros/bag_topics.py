@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 
 from pop_ros.bag_reader import BagError, BagReader, BagTopic
+from pop_ros.compressed import CompressedLike, is_compressed, is_compressed_depth
 from pop_ros.from_messages import COLOR_CHANNELS, DEPTH_TYPES
 
 IMAGE, INFO = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CameraInfo'
+COMPRESSED = 'sensor_msgs/msg/CompressedImage'
 REGISTERED = ('registered', 'aligned', 'depth_to_rgb', 'depth_to_color')
 COLOR_WORDS = ('color', 'colour', 'rgb')
 INFRARED_WORDS = ('infra', '/ir/', '/ir_')
@@ -37,10 +39,17 @@ class RgbdTopics:
 
 @dataclass(frozen=True, slots=True)
 class ImageTopic:
-    """An image topic and the encoding of its first message."""
+    """An image topic and the encoding of its first message.
+
+    Args:
+        name: Topic.
+        encoding: As in the message; of compressed images that of the image inside.
+        is_raw: Whether the image is not compressed.
+    """
 
     name: str
     encoding: str
+    is_raw: bool = True
 
 
 def find_topics(
@@ -71,10 +80,10 @@ def find_topics(
 
 def choose_color(images: Iterable[ImageTopic], infos: Sequence[str]) -> str | None:
     """Return the most likely colour topic: a colour encoding, named so, calibrated."""
-    def score(topic: ImageTopic) -> tuple[bool, bool, bool]:
+    def score(topic: ImageTopic) -> tuple[bool, bool, bool, bool]:
         named = any(word in topic.name for word in COLOR_WORDS)
         calibrated = _sibling(topic.name) in infos
-        return topic.encoding not in {'mono8', '8UC1'}, named, calibrated
+        return topic.encoding not in {'mono8', '8UC1'}, named, calibrated, topic.is_raw
 
     plain = [t for t in images if t.encoding in COLOR_CHANNELS
              and not any(word in t.name for word in INFRARED_WORDS)]
@@ -83,8 +92,9 @@ def choose_color(images: Iterable[ImageTopic], infos: Sequence[str]) -> str | No
 
 def choose_depth(images: Iterable[ImageTopic]) -> str | None:
     """Return the most likely depth topic: a depth encoding, registered to colour."""
-    def score(topic: ImageTopic) -> tuple[bool, bool]:
-        return any(word in topic.name for word in REGISTERED), 'depth' in topic.name
+    def score(topic: ImageTopic) -> tuple[bool, bool, bool]:
+        registered = any(word in topic.name for word in REGISTERED)
+        return registered, 'depth' in topic.name, topic.is_raw
 
     plain = [t for t in images if t.encoding in DEPTH_TYPES
              and not any(word in t.name for word in INFRARED_WORDS)]
@@ -107,14 +117,27 @@ def choose_info(color: str, infos: Sequence[str]) -> str | None:
 
 def _image_topics(bag: BagReader) -> Iterable[ImageTopic]:
     for topic in bag.topics:
-        if topic.kind == IMAGE:
-            first = next(iter(bag.messages([topic.name])), None)
-            if first is not None:
-                yield ImageTopic(topic.name, str(first.read().encoding))
+        if topic.kind not in {IMAGE, COMPRESSED}:
+            continue
+        first = next(iter(bag.messages([topic.name])), None)
+        if first is not None:
+            message = first.read()
+            encoding = compressed_encoding(message) if is_compressed(message) else message.encoding
+            yield ImageTopic(topic.name, str(encoding), topic.kind == IMAGE)
+
+
+def compressed_encoding(message: CompressedLike) -> str:
+    """Return the encoding of the image inside: 'rgb8; jpeg compressed bgr8' is 'rgb8'."""
+    known, _, _ = message.format.partition(';')
+    if is_compressed_depth(message):
+        return known
+    # Drivers that compress themselves say 'jpeg' and no more; depth is never JPEG.
+    return known if known in {*COLOR_CHANNELS, *DEPTH_TYPES} else 'rgb8'
 
 
 def _sibling(color: str) -> str:
-    return str(PurePosixPath(color).parent / 'camera_info')
+    folder = PurePosixPath(color.removesuffix('/compressed')).parent
+    return str(folder / 'camera_info')
 
 
 def _listing(topics: Sequence[BagTopic]) -> str:

@@ -11,7 +11,7 @@ from pop_core.config import PipelineConfig
 from pop_core.estimate import FrameResult
 from pop_core.pipeline import BodyPipeline
 from pop_ros.body_messages import OUTPUT_TYPES, BodyMessages, Output
-from pop_ros.from_messages import ImageLike, frame_from_messages
+from pop_ros.from_messages import frame_from_messages
 from pop_ros.node_arguments import SourceArguments
 from pop_ros.node_config import MeshConfig
 from pop_ros.sources import make_detector, make_pipeline
@@ -65,7 +65,7 @@ class FrameFitter:
         self._messages.configure(mesh)
 
     def fit(
-        self, color: ImageLike, depth: ImageLike, info: Any,
+        self, color: Any, depth: Any, info: Any,
         wanted: Collection[str] = tuple(OUTPUT_TYPES),
     ) -> FittedFrame:
         """Return result and messages of a pair of images and their CameraInfo.

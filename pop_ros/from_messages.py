@@ -13,9 +13,11 @@ import cv2
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-from pop_core.errors import CameraError, PopError
+from pop_core.errors import CameraError
 from pop_core.geometry.camera import Camera
 from pop_core.rgbd import RgbdFrame, clean_depth
+from pop_ros.compressed import decode_compressed_color, decode_compressed_depth, is_compressed
+from pop_ros.message_error import BadMessageError
 
 COLOR_CHANNELS = {'rgb8': 3, 'bgr8': 3, 'rgba8': 4, 'bgra8': 4, 'mono8': 1, '8UC1': 1, '8UC3': 3}
 DEPTH_TYPES = {'16UC1': 'u2', 'mono16': 'u2', '32FC1': 'f4'}
@@ -25,10 +27,6 @@ TO_RGB = {
 }
 NO_DISTORTION = ('', 'none', 'None')
 MODEL_ALIASES = {'fisheye': 'equidistant', 'kannala_brandt4': 'equidistant'}
-
-
-class BadMessageError(PopError):
-    """A message that no frame can be made of; the text says what was expected and found."""
 
 
 class ImageLike(Protocol):
@@ -48,12 +46,14 @@ def stamp_ns(header: Any) -> int:
     return int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
 
 
-def decode_color(message: ImageLike) -> UInt8[np.ndarray, 'h w 3']:
-    """Return the RGB image of a message.
+def decode_color(message: Any) -> UInt8[np.ndarray, 'h w 3']:
+    """Return the RGB image of an Image or CompressedImage.
 
     Raises:
         BadMessageError: If the encoding is not 8-bit colour or grey, or data is missing.
     """
+    if is_compressed(message):
+        return decode_compressed_color(message)
     channels = COLOR_CHANNELS.get(message.encoding)
     if channels is None:
         raise BadMessageError(
@@ -66,12 +66,14 @@ def decode_color(message: ImageLike) -> UInt8[np.ndarray, 'h w 3']:
     return np.array(image) if code is None else cv2.cvtColor(np.ascontiguousarray(image), code)
 
 
-def decode_depth(message: ImageLike) -> Float32[np.ndarray, 'h w']:
-    """Return the depth [m] of a message, NaN where nothing was measured.
+def decode_depth(message: Any) -> Float32[np.ndarray, 'h w']:
+    """Return the depth [m] of an Image or CompressedImage, NaN where nothing was measured.
 
     Raises:
         BadMessageError: If the encoding is not one of REP 118, or data is missing.
     """
+    if is_compressed(message):
+        return decode_compressed_depth(message)
     kind = DEPTH_TYPES.get(message.encoding)
     if kind is None:
         raise BadMessageError(
@@ -112,29 +114,27 @@ def camera_from_info(info: Any) -> Camera:
         raise BadMessageError(f'camera_info: {error}') from error
 
 
-def frame_from_messages(color: ImageLike, depth: ImageLike, info: Any) -> RgbdFrame:
+def frame_from_messages(color: Any, depth: Any, info: Any) -> RgbdFrame:
     """Return the frame of a pair of registered images and their CameraInfo.
 
     Raises:
         BadMessageError: If one of the three cannot be read or they do not belong together.
     """
     camera = camera_from_info(info)
-    sizes = {
-        'color image': (int(color.width), int(color.height)),
-        'depth image': (int(depth.width), int(depth.height)),
-        'camera_info': (camera.width, camera.height),
-    }
-    if len(set(sizes.values())) > 1:
-        found = ', '.join(f'{name} {w}x{h}' for name, (w, h) in sizes.items())
-        raise BadMessageError(
-            f'pair: expected one size for color, depth and camera_info, found {found}: '
-            'use the depth that the driver registers (aligns) to color, and the color camera_info')
     if depth.header.frame_id != color.header.frame_id:
         raise BadMessageError(
             f'pair: expected depth registered to color frame {color.header.frame_id!r}, found '
             f'depth in frame {depth.header.frame_id!r}: switch on depth registration '
             '(align_depth, depth_registered) in the driver')
-    return RgbdFrame(decode_color(color), decode_depth(depth), camera, stamp_ns(color.header))
+    rgb, depth_m = decode_color(color), decode_depth(depth)
+    sizes = {'color image': rgb.shape[1::-1], 'depth image': depth_m.shape[::-1],
+             'camera_info': (camera.width, camera.height)}
+    if len(set(sizes.values())) > 1:
+        found = ', '.join(f'{name} {w}x{h}' for name, (w, h) in sizes.items())
+        raise BadMessageError(
+            f'pair: expected one size for color, depth and camera_info, found {found}: '
+            'use the depth that the driver registers (aligns) to color, and the color camera_info')
+    return RgbdFrame(rgb, depth_m, camera, stamp_ns(color.header))
 
 
 def _rows(message: ImageLike, bytes_per_pixel: int, name: str) -> UInt8[np.ndarray, 'h b']:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
-from sensor_msgs.msg import CameraInfo, Image
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from pop_ros.explanation import TopicReport
 from pop_ros.from_messages import stamp_ns
@@ -18,6 +19,12 @@ from pop_ros.pairing import FramePairer, Pair
 from pop_ros.qos import describe_qos, matched_qos, same_qos
 
 COLOR, DEPTH, INFO = 'color/image', 'depth/image', 'color/camera_info'
+# Where a role's messages come from, best first; suffixes are those of image_transport.
+TRANSPORTS: Mapping[str, Sequence[tuple[str, type]]] = {
+    COLOR: (('', Image), ('/compressed', CompressedImage)),
+    DEPTH: (('', Image), ('/compressedDepth', CompressedImage)),
+    INFO: (('', CameraInfo),),
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,69 +32,76 @@ class RgbdMessages:
     """The messages of one frame.
 
     Args:
-        color: sensor_msgs/Image of colour.
-        depth: sensor_msgs/Image of depth.
+        color: sensor_msgs/Image or CompressedImage of colour.
+        depth: sensor_msgs/Image or CompressedImage of depth.
         info: sensor_msgs/CameraInfo of the colour camera.
         arrival_s: Steady time at which the pair was complete [s].
     """
 
-    color: Image
-    depth: Image
+    color: Any
+    depth: Any
     info: CameraInfo
     arrival_s: float
 
 
 class InputTopic:
-    """One topic whose subscription follows what its publishers offer."""
+    """One input whose subscription follows who publishes it, and what they offer."""
 
-    def __init__(
-        self, node: Node, role: str, kind: type, on_message: Callable[[Any], None],
-        *, latched: bool = False,
-    ) -> None:
-        """Prepare the topic `role` (relative name) of a message type, not subscribed yet."""
+    def __init__(self, node: Node, role: str, on_message: Callable[[Any], None]) -> None:
+        """Prepare the input `role` (relative name), not subscribed yet."""
         self.role, self.topic = role, node.resolve_topic_name(role)
-        self._node, self._kind, self._latched = node, kind, latched
-        self._on_message = on_message
+        self._node, self._on_message = node, on_message
         self._subscription: Subscription | None = None
-        self._profile: QoSProfile | None = None
+        self._subscribed: tuple[str, QoSProfile] | None = None
         self._count = self._counted = 0
         self._counted_at = time.monotonic()
         self._last_stamp_ns: int | None = None
 
     def follow(self, reliability: str) -> None:
         """Subscribe as the present publishers offer; change it when they change."""
-        offers = [o.qos_profile for o in self._node.get_publishers_info_by_topic(self.topic)]
+        topic, kind, offers = self._published()
         if not offers:
             return
-        profile = matched_qos(offers, latched=self._latched, reliability=reliability)
-        if self._profile is not None and same_qos(profile, self._profile):
-            return
+        profile = matched_qos(
+            [o.qos_profile for o in offers], latched=self.role == INFO, reliability=reliability)
+        if self._subscribed is not None:
+            before, present = self._subscribed
+            if before == topic and same_qos(profile, present):
+                return
         self.leave()
-        self._profile = profile
-        self._subscription = self._node.create_subscription(
-            self._kind, self.topic, self._receive, profile)
+        self._subscribed = (topic, profile)
+        self._subscription = self._node.create_subscription(kind, topic, self._receive, profile)
         log = self._node.get_logger()  # type: ignore[no-untyped-call]
-        log.info(f'{self.role}: subscribed {self.topic} ({describe_qos(profile)})')
+        log.info(f'{self.role}: subscribed {topic} ({describe_qos(profile)})')
 
     def leave(self) -> None:
         """Unsubscribe."""
         if self._subscription is not None:
             self._node.destroy_subscription(self._subscription)
-        self._subscription = self._profile = None
+        self._subscription = self._subscribed = None
 
     def report(self) -> TopicReport:
         """Return counts and offers; the rate is that since the report before."""
         now = time.monotonic()
         rate_hz = (self._count - self._counted) / max(now - self._counted_at, 1e-3)
         self._counted, self._counted_at = self._count, now
-        offers = self._node.get_publishers_info_by_topic(self.topic)
+        topic, kind, offers = self._published()
         texts = tuple(f'{o.node_name} ({describe_qos(o.qos_profile)})' for o in offers)
-        others = () if texts else self._same_type()
+        others = () if texts else self._same_type(kind)
         return TopicReport(
-            self.role, self.topic, texts, self._count, rate_hz, self._last_stamp_ns, others)
+            self.role, topic, texts, self._count, rate_hz, self._last_stamp_ns, others)
 
-    def _same_type(self) -> tuple[str, ...]:
-        name = f'{self._kind.__module__.split(".")[0]}/msg/{self._kind.__name__}'
+    def _published(self) -> tuple[str, type, Sequence[TopicEndpointInfo]]:
+        """Return the best transport that is published: topic, type and its publishers."""
+        for suffix, kind in TRANSPORTS[self.role]:
+            topic = f'{self.topic}{suffix}'
+            offers = self._node.get_publishers_info_by_topic(topic)
+            if offers:
+                return topic, kind, offers
+        return self.topic, TRANSPORTS[self.role][0][1], ()
+
+    def _same_type(self, kind: type) -> tuple[str, ...]:
+        name = f'{kind.__module__.split(".")[0]}/msg/{kind.__name__}'
         known = self._node.get_topic_names_and_types()
         same = [topic for topic, types in known
                 if name in types and self._node.count_publishers(topic)]
@@ -107,15 +121,15 @@ class RgbdInputs:
         self, node: Node, slop_s: float, on_frame: Callable[[RgbdMessages], None]
     ) -> None:
         """Prepare the inputs; nothing is subscribed before `follow`."""
-        self.pairer: FramePairer[Image] = FramePairer(round(slop_s * 1e9))
+        self.pairer: FramePairer[Any] = FramePairer(round(slop_s * 1e9))
         self._on_frame = on_frame
         self._info: CameraInfo | None = None
-        self._without_info: Pair[Image] | None = None
+        self._without_info: Pair[Any] | None = None
         self.last_frame_s = time.monotonic()
         self.topics = (
-            InputTopic(node, COLOR, Image, self._on_color),
-            InputTopic(node, DEPTH, Image, self._on_depth),
-            InputTopic(node, INFO, CameraInfo, self._on_info, latched=True),
+            InputTopic(node, COLOR, self._on_color),
+            InputTopic(node, DEPTH, self._on_depth),
+            InputTopic(node, INFO, self._on_info),
         )
 
     def follow(self, reliability: str) -> None:
@@ -144,11 +158,11 @@ class RgbdInputs:
         """Return the state of the three topics."""
         return [topic.report() for topic in self.topics]
 
-    def _on_color(self, message: Image) -> None:
+    def _on_color(self, message: Any) -> None:
         now_ns = time.monotonic_ns()
         self._hand_on(self.pairer.add_color(stamp_ns(message.header), message, now_ns))
 
-    def _on_depth(self, message: Image) -> None:
+    def _on_depth(self, message: Any) -> None:
         now_ns = time.monotonic_ns()
         self._hand_on(self.pairer.add_depth(stamp_ns(message.header), message, now_ns))
 
@@ -158,7 +172,7 @@ class RgbdInputs:
             pair, self._without_info = self._without_info, None
             self._hand_on([pair])
 
-    def _hand_on(self, pairs: list[Pair[Image]]) -> None:
+    def _hand_on(self, pairs: list[Pair[Any]]) -> None:
         for pair in pairs:
             if self._info is None:
                 self._without_info = pair

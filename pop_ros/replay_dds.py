@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import Any
 
@@ -18,7 +18,6 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from sensor_msgs.msg import CameraInfo, Image
 
 from pop_core.errors import PopError
 from pop_ros.bag_reader import BagReader
@@ -26,7 +25,7 @@ from pop_ros.bag_topics import RgbdTopics
 from pop_ros.bag_writer import BagWriter
 from pop_ros.body_messages import OUTPUT_TYPES
 from pop_ros.diagnostics import DROP_PREFIX, MISSED, RECEIVED, WHY_MISSED, read_values
-from pop_ros.inputs import COLOR, DEPTH, INFO
+from pop_ros.inputs import COLOR, DEPTH, INFO, TRANSPORTS
 from pop_ros.node_arguments import SourceArguments
 from pop_ros.qos import output_qos
 from pop_ros.replay import KINDS, OUTPUT_NAMESPACE, ReplaySummary, announce_outputs
@@ -70,11 +69,28 @@ class NodeProcess:
             return self._process.wait()
 
 
+def bag_transports(bag: BagReader, topics: RgbdTopics) -> dict[str, tuple[str, type]]:
+    """Return topic suffix and message type with which each role's messages are published."""
+    kinds = {topic.name: topic.kind for topic in bag.topics}
+    named = {COLOR: topics.color, DEPTH: topics.depth, INFO: topics.info}
+    return {
+        role: next((suffix, kind) for suffix, kind in TRANSPORTS[role]
+                   if kinds[topic].endswith(f'/{kind.__name__}'))
+        for role, topic in named.items()}
+
+
 class DdsPlayer:
     """Publishes a bag's images and records the node's outputs."""
 
-    def __init__(self, check: Callable[[], None]) -> None:
-        """Join the ROS graph; `check` raises when there is no point in going on."""
+    def __init__(
+        self, transports: Mapping[str, tuple[str, type]], check: Callable[[], None]
+    ) -> None:
+        """Join the ROS graph.
+
+        Args:
+            transports: Topic suffix and message type by role.
+            check: Raises when there is no point in going on.
+        """
         self._check = check
         self._writer: BagWriter | None = None
         self._values: dict[str, str] = {}
@@ -85,9 +101,9 @@ class DdsPlayer:
         self._node = Node('pop_replay', context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
-        kinds = {COLOR: Image, DEPTH: Image, INFO: CameraInfo}
         self._publishers = {
-            role: self._node.create_publisher(kind, role, 10) for role, kind in kinds.items()}
+            role: self._node.create_publisher(kind, f'{role}{suffix}', 10)
+            for role, (suffix, kind) in transports.items()}
         for name, kind in OUTPUT_TYPES.items():
             self._node.create_subscription(
                 kind, f'{OUTPUT_NAMESPACE}/{name}', self._recorder(name), output_qos(), raw=True)

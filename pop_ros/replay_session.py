@@ -17,7 +17,7 @@ from pop_ros.frame_fitter import FrameFitter
 from pop_ros.node_arguments import SourceArguments
 from pop_ros.node_config import MeshConfig
 from pop_ros.replay import ReplaySummary, replay_every_frame
-from pop_ros.replay_dds import READY_S, DdsPlayer, NodeProcess
+from pop_ros.replay_dds import READY_S, DdsPlayer, NodeProcess, bag_transports
 
 RUNNING_NODE_S = 30.0
 
@@ -91,7 +91,7 @@ def _over_dds(
     node = None if request.node_running else NodeProcess(request.sources, request.slop_s)
     check = (lambda: None) if node is None else node.check
     try:
-        with DdsPlayer(check) as player:
+        with DdsPlayer(bag_transports(bag, topics), check) as player:
             player.wait_until_subscribed(RUNNING_NODE_S if node is None else READY_S)
             # Nothing is left behind on the disk when the node does not come up.
             with writer:

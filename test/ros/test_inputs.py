@@ -82,6 +82,15 @@ def test_every_frame_arrives_however_the_camera_offers_it(
     assert frame_from_messages(frame.color, frame.depth, frame.info).depth_m[5, 5] == 2.0
 
 
+def test_compressed_images_are_found_where_no_others_are_published(receiver: Receiver) -> None:
+    receive(receiver, CameraPlan(frames=6, compressed=True), 6)
+    assert receiver.stamps() == [START_NS + k * STEP_NS for k in range(6)]
+    last = receiver.frames[-1]
+    frame = frame_from_messages(last.color, last.depth, last.info)
+    assert frame.depth_m[5, 5] == 2.0
+    assert frame.rgb[5, 5].tolist() == [5, 5, 5]
+
+
 def test_a_recording_that_loops_gives_every_pair_every_time(receiver: Receiver) -> None:
     plan = CameraPlan(frames=7, plays=3, depth_lag_ns=4_000_000)
     receive(receiver, plan, 21)

@@ -30,6 +30,7 @@ class CameraPlan:
         depth_lag_ns: Depth stamp minus colour stamp [ns].
         depth_encoding: Encoding of depth.
         break_frame: Index of a frame whose colour image is malformed, -1 for none.
+        compressed: Whether only compressed images are published.
         listeners: Subscribers on each topic to wait for before the first frame.
     """
 
@@ -41,6 +42,7 @@ class CameraPlan:
     depth_lag_ns: int = 0
     depth_encoding: str = '16UC1'
     break_frame: int = -1
+    compressed: bool = False
     listeners: int = 1
 
 
@@ -56,7 +58,7 @@ def main(plan_json: str) -> None:
     """Publish what the plan says."""
     import rclpy
     from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-    from sensor_msgs.msg import CameraInfo, Image
+    from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
     plan = CameraPlan(**json.loads(plan_json))
     reliability = ReliabilityPolicy.RELIABLE if plan.reliable else ReliabilityPolicy.BEST_EFFORT
@@ -64,8 +66,12 @@ def main(plan_json: str) -> None:
     node = rclpy.create_node('camera')
     images = QoSProfile(depth=20, reliability=reliability)
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    color = node.create_publisher(Image, 'color/image', images)
-    depth = node.create_publisher(Image, 'depth/image', images)
+    if plan.compressed:
+        color = node.create_publisher(CompressedImage, 'color/image/compressed', images)
+        depth = node.create_publisher(CompressedImage, 'depth/image/compressedDepth', images)
+    else:
+        color = node.create_publisher(Image, 'color/image', images)
+        depth = node.create_publisher(Image, 'depth/image', images)
     info = node.create_publisher(
         CameraInfo, 'color/camera_info', latched if plan.info == 'latched' else 10)
     if plan.info == 'latched':
@@ -84,8 +90,11 @@ def main(plan_json: str) -> None:
             message = color_image(stamp, k)
             if k == plan.break_frame:
                 message.step = 1
-            color.publish(message)
-            depth.publish(depth_image(stamp + plan.depth_lag_ns, plan.depth_encoding))
+            far = depth_image(stamp + plan.depth_lag_ns, plan.depth_encoding)
+            color.publish(as_png(message, 'rgb8; png compressed bgr8', b'')
+                          if plan.compressed else message)
+            depth.publish(as_png(far, '16UC1; compressedDepth png', bytes(12))
+                          if plan.compressed else far)
             time.sleep(1 / plan.rate_hz)
     if plan.info == 'late':
         time.sleep(0.3)
@@ -117,6 +126,19 @@ def depth_image(stamp_ns: int, encoding: str) -> Any:
     return Image(
         header=header(stamp_ns), height=HEIGHT, width=WIDTH, encoding=encoding,
         step=values.strides[0], data=array.array('B', values.tobytes()))
+
+
+def as_png(message: Any, name: str, start: bytes) -> Any:
+    """Return an image as PNG; its grey or 16-bit values mean the same in any channel order."""
+    import array
+
+    import cv2
+    import numpy as np
+    from sensor_msgs.msg import CompressedImage
+    kind, channels = (np.uint8, 3) if message.encoding == 'rgb8' else (np.uint16, 1)
+    pixels = np.frombuffer(message.data, kind).reshape(HEIGHT, WIDTH, channels)
+    data = start + cv2.imencode('.png', pixels)[1].tobytes()
+    return CompressedImage(header=message.header, format=name, data=array.array('B', data))
 
 
 def camera_info(stamp_ns: int) -> Any:
