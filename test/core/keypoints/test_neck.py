@@ -12,6 +12,7 @@ SHOULDERS = [SHARED_INDEX['left_shoulder'], SHARED_INDEX['right_shoulder']]
 @pytest.mark.parametrize('missing', [[], [PELVIS], [PELVIS, NOSE], [NOSE], [NECK]])
 def test_the_two_conventions_undo_each_other(missing):
     uv = np.random.default_rng(0).uniform(0, 600, (15, 2))
+    uv[NECK] = uv[SHOULDERS].mean(axis=0)
     uv[missing] = np.nan
     np.testing.assert_allclose(with_detector_neck(with_smpl_neck(uv)), uv, atol=1e-9)
 
@@ -36,3 +37,8 @@ def test_the_middle_of_the_shoulders_becomes_the_neck_of_the_body(yaw, pelvis_se
     assert before * metres > 0.09
     # From the side the nose lies before the neck, too.
     assert after * metres < (0.03 if pelvis_seen else 0.08)
+
+
+def test_a_neck_that_is_already_the_bodys_stays():
+    uv = CAMERA.project(show(yaw=0.4).truth)
+    np.testing.assert_array_equal(with_smpl_neck(uv), uv)

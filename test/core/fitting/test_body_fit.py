@@ -1,0 +1,101 @@
+"""The fit recovers what it was shown."""
+
+import numpy as np
+import pytest
+from support.one_person import CAMERA, lift_truth, photograph
+
+from pop_core.body.joints import JOINT_INDEX, SHARED_INDEX
+from pop_core.body.kinematics import attached_positions, joints
+from pop_core.body.model import BodyModel, BodyParameters, shared_points
+from pop_core.fitting.body_fit import BodyFit, BodyFitter
+from pop_core.fitting.observation import observe
+from pop_core.fitting.uncertainty import joint_covariance
+from pop_core.geometry.rotation import from_rotvec
+from pop_core.keypoints.lifted_joints import LiftedJoints
+from pop_core.retrieval.candidate import PoseCandidate
+from pop_core.retrieval.pose_prior import load_pose_prior
+from pop_core.rgbd import RgbdFrame
+
+NOBODY = np.zeros((CAMERA.height, CAMERA.width), dtype=bool)
+LEGS = tuple(SHARED_INDEX[f'{side}_{name}'] for side in ('left', 'right')
+             for name in ('knee', 'ankle'))
+
+
+def candidate(body: BodyModel, pose: BodyParameters) -> PoseCandidate:
+    p = attached_positions(shared_points(body), body, pose)
+    return PoseCandidate(
+        pose.body_pose, p, pose.scale, from_rotvec(pose.global_orient), pose.transl, 0.02, 1.0, 0)
+
+
+def disturbed(person: BodyParameters, seed: int, spread_rad: float) -> BodyParameters:
+    """A neighbour in the library: the mean body in a nearby pose, somewhat off."""
+    rng = np.random.default_rng(seed)
+    return person.replaced(
+        body_pose=person.body_pose + spread_rad * rng.normal(size=(23, 3)),
+        transl=person.transl + 0.05 * rng.normal(size=3), betas=np.zeros(10))
+
+
+@pytest.fixture(scope='module')
+def fitter() -> BodyFitter:
+    from pop_core.body.default_body import default_body
+
+    return BodyFitter(default_body(), load_pose_prior())
+
+
+def fit(fitter: BodyFitter, frame: RgbdFrame, lifted: LiftedJoints,
+        start: list[BodyParameters]) -> BodyFit:
+    observation = observe(frame, lifted, NOBODY)
+    return fitter.fit(observation, [candidate(fitter.model, pose) for pose in start])
+
+
+def test_a_person_in_full_view_is_recovered(
+    fitter: BodyFitter, body: BodyModel, person: BodyParameters
+) -> None:
+    start = [disturbed(person, seed, 0.15) for seed in range(3)]
+    result = fit(fitter, photograph(body, person), lift_truth(body, person), start)
+    error = np.linalg.norm(joints(body, result.parameters) - joints(body, person), axis=1)
+    # The sensor is perfect; cloth (6 mm) is assumed and not worn, and joints lie deep in flesh.
+    assert error.mean() < 0.025
+    seen = error[[JOINT_INDEX[n] for n in ('head', 'left_wrist', 'right_wrist', 'left_knee')]]
+    assert seen.max() < 0.04
+
+
+def test_the_hypothesis_that_agrees_with_the_depth_wins(
+    fitter: BodyFitter, body: BodyModel, person: BodyParameters
+) -> None:
+    """Legs unseen by the detector: only the depth image tells standing from sitting."""
+    sitting = person.body_pose.copy()
+    sitting[[0, 1], 0] = -1.5
+    sitting[[3, 4], 0] = 1.5
+    start = [person.replaced(body_pose=sitting, betas=np.zeros(10)), disturbed(person, 1, 0.1)]
+    result = fit(fitter, photograph(body, person), lift_truth(body, person, LEGS), start)
+    error = np.linalg.norm(joints(body, result.parameters) - joints(body, person), axis=1)
+    ankles = error[[JOINT_INDEX['left_ankle'], JOINT_INDEX['right_ankle']]]
+    assert ankles.max() < 0.08
+
+
+def test_hidden_legs_have_larger_covariance_than_seen_arms(
+    fitter: BodyFitter, body: BodyModel, person: BodyParameters
+) -> None:
+    frame = photograph(body, person)
+    depth = frame.depth_m.copy()
+    depth[125:] = 1.8  # a counter before everything below the hips
+    start = [disturbed(person, seed, 0.15) for seed in range(3)]
+    result = fit(fitter, RgbdFrame(frame.rgb, depth, CAMERA),
+                 lift_truth(body, person, LEGS), start)
+    covariance = joint_covariance(
+        body, result.parameters, result.hessian, result.runners_up, np.zeros(24, dtype=np.int64))
+    sigma = np.sqrt(np.trace(covariance, axis1=1, axis2=2))
+    np.testing.assert_allclose(covariance, covariance.transpose(0, 2, 1), atol=1e-12)
+    assert (np.linalg.eigvalsh(covariance) > 0).all()
+    hidden = sigma[[JOINT_INDEX['left_ankle'], JOINT_INDEX['right_ankle']]]
+    assert hidden.min() > 2 * sigma[JOINT_INDEX['left_elbow']]
+
+
+def test_runners_up_are_reported(
+    fitter: BodyFitter, body: BodyModel, person: BodyParameters
+) -> None:
+    start = [disturbed(person, seed, 0.15) for seed in range(3)]
+    result = fit(fitter, photograph(body, person), lift_truth(body, person), start)
+    assert len(result.runners_up) == fitter.config.final_hypotheses - 1
+    assert set(result.energies) == {'E_J3D', 'E_prior', 'E_NN', 'E_depth'}

@@ -1,0 +1,94 @@
+"""Every term's Jacobian against central differences, at a pose where nothing is zero."""
+
+import numpy as np
+import pytest
+from support.one_person import CAMERA, lift_truth
+
+from pop_core.body.model import BodyModel, BodyParameters
+from pop_core.fitting.body_state import BodyState, FitBody
+from pop_core.fitting.levenberg_marquardt import Residual
+from pop_core.fitting.observation import keypoint_rays
+from pop_core.fitting.priors import (
+    conditional_prior_residual,
+    limit_prior_residual,
+    pose_prior_residual,
+    shape_prior_residual,
+)
+from pop_core.fitting.residuals import Pairs, joint_residual, pair_residual, ray_residual
+from pop_core.keypoints.lifted_joints import LiftedJoints
+from pop_core.retrieval.pose_prior import load_pose_prior
+
+STEP = 1e-6
+
+
+@pytest.fixture
+def state(body: BodyModel, person: BodyParameters) -> BodyState:
+    rng = np.random.default_rng(3)
+    bent = person.replaced(
+        body_pose=person.body_pose + 0.3 * rng.normal(size=(23, 3)), scale=1.05)
+    return FitBody(body, full=False).state(bent)
+
+
+@pytest.fixture
+def lifted(body: BodyModel, person: BodyParameters) -> LiftedJoints:
+    return lift_truth(body, person)
+
+
+def assert_is_derivative(term: object, state: BodyState) -> None:
+    block: Residual = term(state, True)
+    assert block.J is not None
+    assert len(block.r)
+    for k in range(state.body.size):
+        step = np.zeros(state.body.size)
+        step[k] = STEP
+        ahead, behind = term(state.moved(step), False), term(state.moved(-step), False)
+        numeric = (ahead.r - behind.r) / (2 * STEP)
+        np.testing.assert_allclose(block.J[:, k], numeric, rtol=2e-5, atol=1e-6)
+
+
+def test_joint_term(state: BodyState, lifted: LiftedJoints) -> None:
+    weight = np.ones(15)
+    assert_is_derivative(lambda s, j: joint_residual(s, lifted, weight, jacobian=j), state)
+
+
+def test_ray_term(state: BodyState, lifted: LiftedJoints) -> None:
+    blind = LiftedJoints(np.full((15, 3), np.nan), np.full(15, np.inf), lifted.state,
+                         lifted.keypoints_px, lifted.scores)
+    rays = keypoint_rays(blind, CAMERA)
+    assert_is_derivative(lambda s, j: ray_residual(s, rays, np.ones(15), jacobian=j), state)
+
+
+def test_surface_term(state: BodyState) -> None:
+    rng = np.random.default_rng(4)
+    vertex = rng.integers(0, len(state.vertices), 40)
+    pairs = Pairs(vertex, rng.normal(size=(40, 3)), rng.normal(size=(40, 3)), np.ones(40))
+    assert_is_derivative(lambda s, j: pair_residual(s, pairs, jacobian=j), state)
+
+
+def test_conditional_prior(state: BodyState, person: BodyParameters) -> None:
+    sigma = np.linspace(0.2, 0.9, 23)
+    assert_is_derivative(
+        lambda s, j: conditional_prior_residual(s, person.body_pose, sigma, 1.0, jacobian=j),
+        state)
+
+
+def test_pose_prior(state: BodyState) -> None:
+    prior = load_pose_prior()
+    assert_is_derivative(lambda s, j: pose_prior_residual(s, prior, 1.0, jacobian=j), state)
+
+
+def test_limit_prior(state: BodyState) -> None:
+    assert_is_derivative(lambda s, j: limit_prior_residual(s, jacobian=j), state)
+
+
+def test_shape_prior(state: BodyState) -> None:
+    assert_is_derivative(lambda s, j: shape_prior_residual(s, jacobian=j), state)
+
+
+def test_joint_term_vanishes_at_the_lifted_joints(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    exact = lift_truth(body, person, sigma_m=1e-9)
+    state = FitBody(body, full=False).state(person)
+    r = joint_residual(state, exact, np.ones(15), jacobian=False).r
+    np.testing.assert_allclose(r, 0, atol=1e-8)
