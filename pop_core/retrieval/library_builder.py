@@ -101,8 +101,8 @@ def convert(source: PoseSource, options: BuildOptions, model: BodyModel) -> Shar
     """Return the arrays of one file's poses, or one line that says why there are none."""
     try:
         clip = read_clip(source, options, model)
-    except (LibraryFileError, OSError) as error:
-        return f'{source.path}: {error}'
+    except (LibraryFileError, OSError, ValueError) as error:
+        return f'{source.path}: {error}'.replace('\n', ' ')
     if options.mirror:
         clip = clip.with_mirror()
     columns = pose_columns(

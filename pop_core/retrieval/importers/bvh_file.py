@@ -110,7 +110,11 @@ def _parse_frames(motion: str, width: int) -> Float[np.ndarray, 'n x']:
     if frames <= 0 or numbers.size != frames * width:
         raise LibraryFileError(
             f'expected {frames} frames of {width} numbers, found {numbers.size} numbers')
-    return numbers.reshape(frames, width)
+    rows = numbers.reshape(frames, width)
+    finite = np.isfinite(rows).all(axis=1)
+    if not finite.all():
+        raise LibraryFileError(f'frame {int(np.argmin(finite))}: expected finite numbers')
+    return rows
 
 
 def _rotations(
