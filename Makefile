@@ -5,6 +5,7 @@
 #   make check    ruff and mypy
 #   make bench-gate   accuracy and speed on a few scenes against the committed baseline
 #   make docs     write the generated pages of docs/ anew
+#   make bench-gate   a few benchmark scenes against the committed baseline
 #
 # Needs Python 3.10 to 3.13 with venv, and make. Choose another Python with PYTHON=, another place
 # for the environment with VENV=. What is downloaded goes into that environment only.
@@ -37,6 +38,9 @@ docs: $(VENV)/.tools
 
 pictures: $(VENV)/.tools
 	$(BIN)/python -m scripts.write_pictures docs/pictures
+
+bench-gate: $(VENV)/.tools
+	$(BIN)/python -m benchmarks gate
 
 clean:
 	rm -rf build dist *.egg-info $(DEMO)
