@@ -7,21 +7,29 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseArray
-from sensor_msgs.msg import PointCloud2
-from visualization_msgs.msg import Marker
+from sensor_msgs.msg import Image, PointCloud2
+from std_msgs.msg import Header
+from visualization_msgs.msg import Marker, MarkerArray
 
 from pop_core.body.model import BodyModel
 from pop_core.estimate import BodyEstimate, FrameResult
-from pop_core.rgbd import RgbdFrame
+from pop_core.rendering.overlay import draw_people
+from pop_core.rendering.shown_body import shown
+from pop_core.rgbd import RgbdFrame, undistort_frame
 from pop_ros import pop_messages, to_messages
 from pop_ros.cdr import MarkerTemplate
+from pop_ros.image_messages import color_message
 from pop_ros.node_config import MeshConfig
 from pop_ros.person_ids import PersonIds
+from pop_ros.skeleton_markers import skeleton_message
 
 MESH, JOINTS, CLOUD, BODIES = 'mesh', 'joints', 'cloud', 'bodies'
-OUTPUT_TYPES = {MESH: Marker, JOINTS: PoseArray, CLOUD: PointCloud2}
+SKELETON, OVERLAY = 'skeleton', 'overlay'
+# What `pop replay` records; the other outputs are pictures of the same.
+RECORDED_TYPES: dict[str, Any] = {MESH: Marker, JOINTS: PoseArray, CLOUD: PointCloud2}
 if pop_messages.pop_msgs is not None:
-    OUTPUT_TYPES[BODIES] = pop_messages.pop_msgs.BodyArray
+    RECORDED_TYPES[BODIES] = pop_messages.pop_msgs.BodyArray
+OUTPUT_TYPES: dict[str, Any] = {**RECORDED_TYPES, SKELETON: MarkerArray, OVERLAY: Image}
 MAX_TEMPLATES = 64  # ids never return; templates of people who left are of no use
 
 # A topic's name without the node's, and a message or its serialised bytes.
@@ -43,28 +51,41 @@ class BodyMessages:
         self._mesh = mesh
         self._templates.clear()
 
+    def reset(self) -> None:
+        """Start ids anew; markers of ids that are not given again are removed."""
+        self._ids = PersonIds()
+
     def build(
         self, result: FrameResult, frame: RgbdFrame, frame_id: str,
-        wanted: Collection[str] = tuple(OUTPUT_TYPES),
+        wanted: Collection[str] = tuple(RECORDED_TYPES),
     ) -> list[Output]:
         """Return the messages of a frame for the wanted topics.
 
         A frame without people gives messages only when somebody has just left: removals, and one
-        empty set of joints and points.
+        empty set of joints and points. Only the overlay, a picture, comes with every frame.
         """
         bodies = result.bodies
         ids = self._ids.assign(np.array([b.joints[0] for b in bodies]).reshape(-1, 3))
         gone, self._shown = self._shown - set(ids), set(ids)
-        if not bodies and not gone:
-            return []
         header = to_messages.make_header(frame.stamp_ns, frame_id)
+        picture = [(OVERLAY, self._overlay(result, frame, header))] if OVERLAY in wanted else []
+        if not bodies and not gone:
+            return picture
         makers: dict[str, Callable[[], list[Any]]] = {
             MESH: lambda: self._meshes(result, ids, gone, frame.stamp_ns, frame_id),
             JOINTS: lambda: [to_messages.joints_message(bodies, header)],
             CLOUD: lambda: [to_messages.cloud_message(frame, bodies, ids, header)],
             BODIES: lambda: [pop_messages.bodies_message(bodies, ids, header)],
+            SKELETON: lambda: [skeleton_message(bodies, ids, gone, header)],
         }
-        return [(name, m) for name, make in makers.items() if name in wanted for m in make()]
+        chosen = [(name, make()) for name, make in makers.items() if name in wanted]
+        return picture + [(name, message) for name, made in chosen for message in made]
+
+    def _overlay(self, result: FrameResult, frame: RgbdFrame, header: Header) -> Image:
+        # Meshes are drawn as a pinhole sees them.
+        seen = undistort_frame(frame)
+        people = [shown(body) for body in result.bodies]
+        return color_message(draw_people(seen.rgb, people, self._model.f, seen.camera), header)
 
     def _meshes(
         self, result: FrameResult, ids: list[int], gone: set[int], stamp_ns: int, frame_id: str

@@ -10,7 +10,7 @@ from pop_core.body.model import BodyModel
 from pop_core.config import PipelineConfig
 from pop_core.estimate import FrameResult
 from pop_core.pipeline import BodyPipeline
-from pop_ros.body_messages import OUTPUT_TYPES, BodyMessages, Output
+from pop_ros.body_messages import RECORDED_TYPES, BodyMessages, Output
 from pop_ros.from_messages import frame_from_messages
 from pop_ros.node_arguments import SourceArguments
 from pop_ros.node_config import MeshConfig
@@ -64,9 +64,13 @@ class FrameFitter:
             old.model, old.library, old.detector, pipeline_config, old.fitter.prior)
         self._messages.configure(mesh)
 
+    def reset(self) -> None:
+        """Start the ids of people anew."""
+        self._messages.reset()
+
     def fit(
         self, color: Any, depth: Any, info: Any,
-        wanted: Collection[str] = tuple(OUTPUT_TYPES),
+        wanted: Collection[str] = tuple(RECORDED_TYPES),
     ) -> FittedFrame:
         """Return result and messages of a pair of images and their CameraInfo.
 

@@ -13,7 +13,7 @@ from pop_core.errors import PopError
 from pop_ros.bag_reader import BagMessage, BagReader
 from pop_ros.bag_topics import RgbdTopics
 from pop_ros.bag_writer import BagWriter
-from pop_ros.body_messages import OUTPUT_TYPES
+from pop_ros.body_messages import RECORDED_TYPES
 from pop_ros.diagnostics import MISSED, percentiles
 from pop_ros.explanation import explain_refused_pairs
 from pop_ros.frame_fitter import FrameFitter
@@ -23,7 +23,7 @@ from pop_ros.statistics import drop_reason
 
 OUTPUT_NAMESPACE = '/pop'
 KINDS = {name: f'{kind.__module__.split(".")[0]}/msg/{kind.__name__}'
-         for name, kind in OUTPUT_TYPES.items()}
+         for name, kind in RECORDED_TYPES.items()}
 
 
 @dataclass(slots=True)

@@ -23,7 +23,7 @@ from pop_core.errors import PopError
 from pop_ros.bag_reader import BagReader
 from pop_ros.bag_topics import RgbdTopics
 from pop_ros.bag_writer import BagWriter
-from pop_ros.body_messages import OUTPUT_TYPES
+from pop_ros.body_messages import RECORDED_TYPES
 from pop_ros.diagnostics import DROP_PREFIX, MISSED, RECEIVED, WHY_MISSED, read_values
 from pop_ros.inputs import COLOR, DEPTH, INFO, TRANSPORTS
 from pop_ros.node_arguments import SourceArguments
@@ -104,7 +104,7 @@ class DdsPlayer:
         self._publishers = {
             role: self._node.create_publisher(kind, f'{role}{suffix}', 10)
             for role, (suffix, kind) in transports.items()}
-        for name, kind in OUTPUT_TYPES.items():
+        for name, kind in RECORDED_TYPES.items():
             self._node.create_subscription(
                 kind, f'{OUTPUT_NAMESPACE}/{name}', self._recorder(name), output_qos(), raw=True)
         self._node.create_subscription(DiagnosticArray, '/diagnostics', self._on_report, 10)

@@ -3,14 +3,18 @@
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 import rclpy
+from geometry_msgs.msg import PoseArray
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, SetParameters
+from sensor_msgs.msg import Image
+from std_srvs.srv import SetBool, Trigger
 from support.camera import CameraPlan, start_camera
 from support.messages import FRAME_ID
 from support.node import RunningNode
@@ -204,6 +208,35 @@ def test_settings_are_described_and_refused_with_a_reason() -> None:
         accepted = ParameterValue(type=2, integer_value=3)
         wish = SetParameters.Request(parameters=[Parameter(name='max_people', value=accepted)])
         assert call(client, setter, wish).results[0].successful
+    finally:
+        client.destroy_node()
+        rclpy.shutdown()
+
+
+@pytest.mark.usefixtures('node')
+def test_services_stop_the_work_start_it_again_and_start_ids_anew() -> None:
+    rclpy.init()
+    client = rclpy.create_node('client')
+    client.create_subscription(PoseArray, '/pop/joints', lambda _: None, 5)
+    camera = client.create_publisher(Image, 'color/image', 5)
+
+    def listens(expected: bool) -> bool:
+        end_s = time.monotonic() + 10
+        while bool(camera.get_subscription_count()) != expected and time.monotonic() < end_s:
+            rclpy.spin_once(client, timeout_sec=0.05)
+        return bool(camera.get_subscription_count()) == expected
+
+    try:
+        enable = client.create_client(SetBool, '/pop/enable')
+        reset = client.create_client(Trigger, '/pop/reset')
+        assert enable.wait_for_service(10)
+        assert reset.wait_for_service(10)
+        assert listens(True)
+        assert call(client, enable, SetBool.Request(data=False)).success
+        assert listens(False)
+        assert call(client, enable, SetBool.Request(data=True)).success
+        assert listens(True)
+        assert call(client, reset, Trigger.Request()).success
     finally:
         client.destroy_node()
         rclpy.shutdown()

@@ -5,16 +5,18 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pop_core.body.default_body import default_body
+from pop_core.body.joints import JOINT_INDEX
 from pop_core.body.kinematics import joint_rotations, joints
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.body.skinning import vertices
-from pop_core.estimate import BodyEstimate, FrameResult
+from pop_core.estimate import BodyEstimate, FrameResult, JointState
 from pop_core.geometry.camera import Camera
 from pop_core.rgbd import RgbdFrame
 from pop_ros.body_messages import BodyMessages
-from pop_ros.from_messages import stamp_ns
+from pop_ros.from_messages import decode_color, stamp_ns
 from pop_ros.node_config import MeshConfig
 from pop_ros.person_ids import PersonIds
+from pop_ros.skeleton_markers import HIDDEN
 from pop_ros.to_messages import CLOUD_TYPE, body_poses
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
@@ -103,6 +105,50 @@ def test_a_person_who_leaves_is_deleted_once_and_an_empty_room_is_silent(
     assert all(m.action == 2 for name, m in gone if name == 'mesh')
     assert [len(m.poses) for name, m in gone if name == 'joints'] == [0]
     assert messages.build(result(), frame, 'optical') == []
+
+
+def test_bones_of_hidden_joints_are_drawn_dark_and_the_id_above_the_head(
+    model: BodyModel, frame: RgbdFrame
+) -> None:
+    person = body(model)
+    person.joint_state[JOINT_INDEX['left_knee']] = JointState.SCENE_OCCLUDED
+    messages = BodyMessages(model, MeshConfig())
+    (_, array), = messages.build(result(person), frame, 'optical', ('skeleton',))
+    bones, label = array.markers
+    ends = np.array([[p.x, p.y, p.z] for p in bones.points])
+    assert len(ends) == 2 * 23 == len(bones.colors)
+    knee = np.linalg.norm(ends - person.joints[JOINT_INDEX['left_knee']], axis=1) < 1e-9
+    dark = np.array([color.r == HIDDEN.r for color in bones.colors])
+    assert np.array_equal(dark, knee)
+    assert knee.sum() == 2  # the thigh's end and the shin's
+    assert label.text == '0'
+    assert label.pose.position.y < person.joints[JOINT_INDEX['head'], 1]
+    (_, gone), = messages.build(result(), frame, 'optical', ('skeleton',))
+    assert [m.action for m in gone.markers] == [2, 2]
+
+
+def test_the_overlay_comes_with_every_frame_and_shows_the_body(
+    model: BodyModel, frame: RgbdFrame
+) -> None:
+    messages = BodyMessages(model, MeshConfig())
+    (_, empty), = messages.build(result(), frame, 'optical', ('overlay',))
+    assert np.array_equal(decode_color(empty), frame.rgb)
+    outputs = dict(messages.build(result(body(model)), frame, 'optical', ('overlay',)))
+    assert stamp_ns(outputs['overlay'].header) == STAMP_NS
+    changed = np.any(decode_color(outputs['overlay']) != frame.rgb, axis=2)
+    assert changed[body(model).mask].mean() > 0.3
+
+
+def test_after_a_reset_ids_start_anew_and_old_ones_are_removed(
+    model: BodyModel, frame: RgbdFrame
+) -> None:
+    messages = BodyMessages(model, MeshConfig())
+    messages.build(result(body(model), body(model, 1.5)), frame, 'optical', ())
+    messages.build(result(body(model, 1.5)), frame, 'optical', ())
+    messages.reset()
+    outputs = messages.build(result(body(model, 1.5)), frame, 'optical', ('mesh', 'skeleton'))
+    deleted = [m.id for name, m in outputs if name == 'mesh' and not isinstance(m, bytes)]
+    assert deleted == [1]
 
 
 @pytest.mark.parametrize(('detail', 'triangles'), [('full', 'f'), ('reduced', 'fit_faces')])

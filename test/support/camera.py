@@ -112,7 +112,7 @@ def header(stamp_ns: int) -> Any:
 def color_image(stamp_ns: int, value: int) -> Any:
     import numpy as np
 
-    from pop_ros.frame_bag import color_message
+    from pop_ros.image_messages import color_message
     return color_message(np.full((HEIGHT, WIDTH, 3), value % 256, np.uint8), header(stamp_ns))
 
 
@@ -143,6 +143,6 @@ def as_png(message: Any, name: str, start: bytes) -> Any:
 
 def camera_info(stamp_ns: int) -> Any:
     from pop_core.geometry.camera import Camera
-    from pop_ros.frame_bag import info_message
+    from pop_ros.image_messages import info_message
     camera = Camera(WIDTH, HEIGHT, 60.0, 60.0, 31.5, 23.5)
     return info_message(camera, header(stamp_ns))
