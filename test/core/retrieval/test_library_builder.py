@@ -6,7 +6,6 @@ import pytest
 
 from benchmarks.pose_files import write_amass, write_bvh, write_surreal
 from pop_core.body.default_body import default_body
-from pop_core.body.joints import SHARED_INDEX
 from pop_core.errors import LibraryFileError
 from pop_core.retrieval import library_builder
 from pop_core.retrieval.build_workers import ProcessRunner, run_here
@@ -121,6 +120,7 @@ def test_processes_build_the_same_library(folder):
 
 def test_all_kinds_can_be_mixed(folder):
     root, body = poses(4, 9)
+    body *= 0.2  # within the limits that BVH poses are brought into
     write_bvh(folder / 'a.bvh', root, body, MODEL.joint_template)
     write_surreal(folder, 'b', root, body, np.zeros((4, 24, 2)))
     sources = [
@@ -130,10 +130,8 @@ def test_all_kinds_can_be_mixed(folder):
     report = build_from_files(folder / 'mixed.poplib', sources, ALL, MODEL, runner=run_here)
     assert report.poses_kept == 4 + 4 + 30
     library = load_library(folder / 'mixed.poplib')
-    legs = [SHARED_INDEX[f'{side}_{name}'] for side in ('left', 'right')
-            for name in ('hip', 'knee', 'ankle')]
-    # Arms of random poses exceed the limits, which BVH poses are brought within.
-    assert np.allclose(library.joints[:4, legs], library.joints[4:8, legs], atol=1e-3)
+    # The spine bends evenly after BVH, which moves shoulders by millimetres.
+    assert np.allclose(library.joints[:4], library.joints[4:8], atol=0.01)
 
 
 def test_a_folder_without_files_is_refused(tmp_path):
