@@ -130,8 +130,8 @@ def test_all_kinds_can_be_mixed(folder):
     report = build_from_files(folder / 'mixed.poplib', sources, ALL, MODEL, runner=run_here)
     assert report.poses_kept == 4 + 4 + 30
     library = load_library(folder / 'mixed.poplib')
-    # The spine bends evenly after BVH, which moves shoulders by millimetres.
-    assert np.allclose(library.joints[:4], library.joints[4:8], atol=0.01)
+    # The spine bends evenly after BVH, which moves shoulders by a centimetre.
+    assert np.allclose(library.joints[:4], library.joints[4:8], atol=0.02)
 
 
 def test_a_folder_without_files_is_refused(tmp_path):
