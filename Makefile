@@ -4,6 +4,7 @@
 #   make test     the whole test suite
 #   make check    ruff and mypy
 #   make bench-gate   accuracy and speed on a few scenes against the committed baseline
+#   make messages build the ROS messages of msg_defs without a ROS installation (needs g++, python3-dev)
 #   make docs     write the generated pages of docs/ anew
 #   make bench-gate   a few benchmark scenes against the committed baseline
 #
@@ -32,6 +33,9 @@ check: $(VENV)/.tools
 
 bench-gate: $(VENV)/.tools
 	$(BIN)/python -m benchmarks gate
+
+messages: $(BIN)/python
+	scripts/build_messages.sh build/pop_msgs $(BIN)/python
 
 docs: $(VENV)/.tools
 	$(BIN)/python -m scripts.write_docs
@@ -62,6 +66,6 @@ $(VENV)/.tools: setup.py constraints.txt | $(BIN)/python
 
 # Not editable: an editable install leaves out what ROS looks for below share/.
 $(VENV)/.installed: $(VENV)/.tools $(SOURCES)
-	rm -rf build  # modules deleted since the last build would come along
+	rm -rf build/lib build/bdist.*  # modules deleted since the last build would come along
 	$(PIP) install --quiet --no-deps --no-build-isolation --force-reinstall .
 	touch $@
