@@ -217,8 +217,9 @@ class BodyFitter:
         active: Bool[np.ndarray, 'x'],
         pairs: Pairs | None,
     ) -> None:
-        parts = [ground_pairs(hypothesis.state, observation.ground)] if observation.ground else []
-        parts += [pairs] if pairs is not None else []
+        parts = [] if pairs is None else [pairs]
+        if observation.ground is not None:
+            parts.append(ground_pairs(hypothesis.state, observation.ground, observation.lifted))
         energy = BodyEnergy(
             hypothesis.state, observation, hypothesis.belief, weights,
             join_pairs(parts) if parts else None)
@@ -281,7 +282,8 @@ class BodyFitter:
         for hypothesis in hypotheses:
             floor = None
             if observation.ground is not None:
-                floor = ground_pairs(hypothesis.state, observation.ground, geman_mcclure_share)
+                floor = ground_pairs(
+                    hypothesis.state, observation.ground, observation.lifted, geman_mcclure_share)
             energy = BodyEnergy(
                 hypothesis.state, observation, hypothesis.belief, self._weights(1.0), floor,
                 kernel=geman_mcclure_share)
