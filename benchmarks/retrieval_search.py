@@ -47,7 +47,7 @@ def measure_shortlist(queries: int) -> list[dict[str, object]]:
     tree = cKDTree(descriptors)
     built_s = time.perf_counter() - start
     exact_ms, tree_ms, shared = [], [], []
-    for lifted in _queries(library, queries):
+    for lifted in _queries(library, queries, hide=0):
         target, weight = lifted.positions_camera, np.ones(len(lifted.scores))
         start = time.perf_counter()
         costs = rank_similarities(library.columns, target, weight, (0.5, 1.25))
@@ -111,8 +111,8 @@ def _write_large(path: Path, library: PoseLibrary, poses: int) -> None:
                     arrays[name][part] = getattr(library, name)[rows]
 
 
-def _queries(library: PoseLibrary, queries: int) -> list[LiftedJoints]:
-    """Return noisy library poses seen by a camera, a third of the joints hidden."""
+def _queries(library: PoseLibrary, queries: int, hide: int = 5) -> list[LiftedJoints]:
+    """Return noisy library poses seen by a camera, some of the joints hidden."""
     rng = np.random.default_rng(1)
     out = []
     for row in rng.integers(0, len(library), queries):
@@ -121,7 +121,7 @@ def _queries(library: PoseLibrary, queries: int) -> list[LiftedJoints]:
         joints = np.asarray(library.joints[row], dtype=np.float64) @ R.T + [0, 0, 3]
         joints += rng.normal(0, 0.02, joints.shape)
         sigma = np.full(15, 0.02)
-        hidden = rng.choice(15, 5, replace=False)
+        hidden = rng.choice(15, hide, replace=False)
         joints[hidden], sigma[hidden] = np.nan, np.inf
         out.append(LiftedJoints(
             joints, sigma, np.zeros(15, dtype=int), np.full((15, 2), np.nan), np.ones(15)))

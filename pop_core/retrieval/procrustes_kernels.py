@@ -16,7 +16,7 @@ NEWTON_STEPS = 7
 SQRT3 = np.float32(1.7320508)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True, fastmath=True, error_model='numpy')
 def similarity_costs(
     columns, chosen, target, weight, limits, yaw_only, upright, out, first, last
 ):
@@ -70,7 +70,7 @@ def similarity_costs(
     return out
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True, fastmath=True, error_model='numpy')
 def _free_costs(sums, size, spread, limits, upright, out):
     """Fill costs of rotations of any axis.
 
@@ -105,7 +105,7 @@ def _free_costs(sums, size, spread, limits, upright, out):
         out[i] = max(spread + scale * (scale * own - two * reach), np.float32(0.0))
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@njit(cache=True, nogil=True, fastmath=True, error_model='numpy')
 def _yaw_costs(sums, size, spread, limits, out):
     """Fill costs of rotations about y alone."""
     tiny, two = np.float32(1e-12), np.float32(2.0)
