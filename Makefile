@@ -1,12 +1,11 @@
 # Commands for people; .ci/run calls the same ones.
 #
-#   make demo     from nothing to pictures of a fitted, half-hidden person
-#   make test     the whole test suite
-#   make check    ruff and mypy
+#   make demo         from nothing to pictures of a fitted, half-hidden person
+#   make test         the whole test suite
+#   make check        ruff and mypy
 #   make bench-gate   accuracy and speed on a few scenes against the committed baseline
-#   make messages build the ROS messages of msg_defs without a ROS installation (needs g++, python3-dev)
-#   make docs     write the generated pages of docs/ anew
-#   make bench-gate   a few benchmark scenes against the committed baseline
+#   make messages     the ROS messages of msg_defs without ROS (needs g++ and python3-dev)
+#   make docs         write the generated pages of docs/ anew
 #
 # Needs Python 3.10 to 3.13 with venv, and make. Choose another Python with PYTHON=, another place
 # for the environment with VENV=. What is downloaded goes into that environment only.
@@ -18,7 +17,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 SOURCES := $(shell find pop_core pop_ros -type f -not -name '*.pyc') setup.py package.xml
 
-.PHONY: demo test check bench-gate docs pictures clean
+.PHONY: demo test check bench-gate messages docs pictures clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.installed
@@ -42,9 +41,6 @@ docs: $(VENV)/.tools
 
 pictures: $(VENV)/.tools
 	$(BIN)/python -m scripts.write_pictures docs/pictures
-
-bench-gate: $(VENV)/.tools
-	$(BIN)/python -m benchmarks gate
 
 clean:
 	rm -rf build dist *.egg-info $(DEMO)
