@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from threadpoolctl import ThreadpoolController
 
 from pop_core.body.kinematics import joint_rotations
@@ -33,6 +33,7 @@ from pop_core.segmentation.body_segmentation import segment_body
 from pop_core.segmentation.ground import Ground, find_ground
 from pop_core.stopwatch import Stopwatch
 
+SAME_PLACE_M = 0.3  # a person behind another is often lifted onto the one in front
 SUPPORT_M = 0.08  # measured and rendered depth agree within clothes and a small misfit
 
 
@@ -99,7 +100,7 @@ class BodyPipeline:
         statuses = [self._admit(j, z) for j, z in zip(lifted, distance_m, strict=True)]
         scene = Scene(frame, ground, np.zeros(frame.depth_m.shape, dtype=bool))
         bodies: list[BodyEstimate] = []
-        for i in np.argsort(distance_m, kind='stable'):
+        for i in _nearest_first(distance_m, detections):
             if statuses[i] is not EstimateStatus.OK or len(bodies) >= self.config.max_people:
                 continue
             estimate, status = self._fit_person(scene, detections[i], lifted[i], watch)
@@ -116,7 +117,12 @@ class BodyPipeline:
         lifted: LiftedJoints,
         watch: Stopwatch,
     ) -> tuple[BodyEstimate | None, EstimateStatus]:
-        """Retrieve, fit and segment one person."""
+        """Lift what nearer people left, then retrieve, fit and segment one person."""
+        if covers_keypoints(scene.taken, detection):
+            with watch.step('lift'):
+                lifted = self._lift(without_depth(scene.frame, scene.taken), detection)
+            if self._admit(lifted, _distance_m(lifted)) is not EstimateStatus.OK:
+                return None, EstimateStatus.TOO_FEW_JOINTS
         with watch.step('observe'):
             observation = observe(
                 scene.frame, lifted, scene.taken, scene.ground, detection.part_labels)
@@ -184,6 +190,19 @@ class BodyPipeline:
         return EstimateStatus.OK
 
 
+def covers_keypoints(taken: Bool[np.ndarray, 'h w'], detection: Detection) -> bool:
+    """Return whether a keypoint of a person lies on pixels that another person explains."""
+    uv = detection.keypoints_px[np.isfinite(detection.keypoints_px).all(axis=1)]
+    u, v = np.clip(np.rint(uv), 0, np.array(taken.shape[::-1]) - 1).astype(np.int64).T
+    return bool(taken[v, u].any())
+
+
+def without_depth(frame: RgbdFrame, taken: Bool[np.ndarray, 'h w']) -> RgbdFrame:
+    """Return a frame with nothing measured at some pixels: nobody else is lifted onto them."""
+    depth_m = np.where(taken, np.float32(np.nan), frame.depth_m)
+    return replace(frame, depth_m=depth_m)
+
+
 def undistort_detection(detection: Detection, camera: Camera) -> Detection:
     """Return a detection whose pixels are those of the pure pinhole.
 
@@ -213,6 +232,14 @@ def distort_mask(
     v = np.rint(rays[..., 1] * camera.fy + camera.cy).astype(np.int64)
     inside = (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
     return inside & mask[np.where(inside, v, 0), np.where(inside, u, 0)]
+
+
+def _nearest_first(
+    distance_m: Sequence[float], detections: Sequence[Detection]
+) -> Int[np.ndarray, 'n']:
+    """Return the order of people: nearest first, and of two in one place the better seen."""
+    place = np.floor(np.minimum(distance_m, 1e6) / SAME_PLACE_M)
+    return np.lexsort((-np.array([d.scores.sum() for d in detections]), place))
 
 
 def _distance_m(lifted: LiftedJoints) -> float:
