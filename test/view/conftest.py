@@ -1,0 +1,20 @@
+"""Every test session has a ROS graph of its own on this machine only."""
+
+import os
+import random
+from collections.abc import Iterator
+
+import pytest
+
+# Before anything initialises rclpy; child processes inherit it. Domains up to 101 keep clear of
+# the ports that Linux hands out.
+os.environ['ROS_DOMAIN_ID'] = str(random.SystemRandom().randint(1, 101))
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+
+@pytest.fixture(scope='session', autouse=True)
+def log_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep the logs of nodes out of the home folder."""
+    os.environ['ROS_LOG_DIR'] = str(tmp_path_factory.mktemp('ros_log'))
+    yield
+    del os.environ['ROS_LOG_DIR']
