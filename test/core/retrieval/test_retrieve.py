@@ -67,10 +67,10 @@ def test_candidates_differ_where_nothing_was_seen(library):
     assert gaps[~np.eye(6, dtype=bool)].min() > 0.05
 
 
-def test_belief_sums_to_one_and_falls_behind_the_best(library):
+def test_belief_sums_to_one_and_falls(library):
     weights = [c.weight for c in retrieve(library, seen_from(placed(library, 9), LEGS))]
     assert np.isclose(sum(weights), 1.0)
-    assert weights[1:] == sorted(weights[1:], reverse=True)
+    assert weights == sorted(weights, reverse=True)
 
 
 def test_a_scene_that_cannot_hide_legs_rules_them_out(library):
@@ -183,14 +183,26 @@ def test_chosen_poses_stand_for_the_camps_of_belief():
     assert np.allclose(share[np.argsort(camp[chosen])], [0.5, 0.3, 0.2])
 
 
-def test_the_best_pose_is_always_chosen_first():
+def test_of_poses_that_agree_the_best_is_chosen():
     rng = np.random.default_rng(1)
     energy = rng.uniform(1, 9, 60)
     energy[17] = 0.5
+    joints = np.zeros((60, 15, 3)) + rng.normal(size=(60, 1, 1)) * 1e-4
     chosen, _ = choose_diverse(
-        rng.normal(size=(60, 15, 3)), energy, np.zeros(15, dtype=bool), RetrievalConfig())
+        joints, energy, np.zeros(15, dtype=bool), RetrievalConfig(candidates=1))
     assert chosen[0] == 17
-    assert len(set(chosen.tolist())) == 6
+
+
+def test_a_single_answer_stands_among_its_like_and_not_with_a_lucky_stranger():
+    """Forty poses agree on the hidden joints; one fits a little better and does not."""
+    rng = np.random.default_rng(2)
+    joints = rng.normal(size=(41, 15, 3)) * 0.01
+    joints[40] += 0.5
+    energy = np.full(41, 2.0)
+    energy[40] = 1.0
+    chosen, _ = choose_diverse(
+        joints, energy, np.ones(15, dtype=bool), RetrievalConfig(candidates=1))
+    assert chosen[0] != 40
 
 
 def test_an_empty_library_is_refused():
