@@ -15,26 +15,27 @@ from pop_core.body.skinning import vertices
 from pop_core.config import PipelineConfig
 from pop_core.estimate import BodyEstimate, EstimateStatus, FrameResult
 from pop_core.fitting.body_fit import BodyFit, BodyFitter
-from pop_core.fitting.joint_state import joint_states
+from pop_core.fitting.joint_state import fitted_joint_states
 from pop_core.fitting.observation import Observation, observe
 from pop_core.fitting.uncertainty import joint_covariance
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.keypoints.lifting import lift_keypoints
+from pop_core.keypoints.undistortion import undistort_detection
 from pop_core.rendering.depth_renderer import render_depth
 from pop_core.retrieval.candidate import PoseCandidate
 from pop_core.retrieval.outliers import reject_outliers
 from pop_core.retrieval.pose_library import PoseLibrary
 from pop_core.retrieval.pose_prior import PosePrior, load_pose_prior
 from pop_core.retrieval.retrieve import retrieve
-from pop_core.rgbd import RgbdFrame, undistort_frame
+from pop_core.rgbd import RgbdFrame, distort_mask, undistort_frame
 from pop_core.segmentation.body_segmentation import segment_body
+from pop_core.segmentation.depth_support import depth_support
 from pop_core.segmentation.ground import Ground, find_ground
 from pop_core.stopwatch import Stopwatch
 
 SAME_PLACE_M = 0.3  # a person behind another is often lifted onto the one in front
-SUPPORT_M = 0.08  # measured and rendered depth agree within clothes and a small misfit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -168,13 +169,11 @@ class BodyPipeline:
         mask = segment_body(
             frame.depth_m, rendered, own, frame.camera.fx, self.config.segmentation)
         joints = fit.coarse.joints
-        state = joint_states(joints, rendered, frame.depth_m, frame.camera)
+        state = fitted_joint_states(
+            self.model, joints, rendered, frame.depth_m, frame.camera)
+        support = depth_support(frame.depth_m, rendered, own)
         covariance = joint_covariance(
-            self.model, parameters, fit.hessian, fit.runners_up, state)
-        with np.errstate(invalid='ignore'):
-            open_to_view = rendered.covered & ~(frame.depth_m < rendered.depth_m - SUPPORT_M)
-            agrees = open_to_view & (np.abs(frame.depth_m - rendered.depth_m) < SUPPORT_M) & own
-        support = float(agrees.sum() / max(int((open_to_view & own).sum()), 1))
+            self.model, parameters, fit.hessian, fit.runners_up, state, support)
         return BodyEstimate(
             parameters=parameters, vertices=mesh, joints=joints,
             joint_rotations=joint_rotations(self.model, parameters), joint_state=state,
@@ -201,37 +200,6 @@ def without_depth(frame: RgbdFrame, taken: Bool[np.ndarray, 'h w']) -> RgbdFrame
     """Return a frame with nothing measured at some pixels: nobody else is lifted onto them."""
     depth_m = np.where(taken, np.float32(np.nan), frame.depth_m)
     return replace(frame, depth_m=depth_m)
-
-
-def undistort_detection(detection: Detection, camera: Camera) -> Detection:
-    """Return a detection whose pixels are those of the pure pinhole.
-
-    Masks and part maps are dropped: they belong to the distorted image.
-    """
-    if not camera.is_distorted:
-        return detection
-    known = np.isfinite(detection.keypoints_px).all(axis=1)
-    pinhole = camera.without_distortion()
-    uv = np.full_like(detection.keypoints_px, np.nan)
-    points = camera.unproject(detection.keypoints_px[known], np.ones(int(known.sum())))
-    uv[known] = pinhole.project(points)
-    corners = camera.unproject(detection.box_px.reshape(2, 2), np.ones(2))
-    return replace(
-        detection, keypoints_px=uv, box_px=pinhole.project(corners).reshape(4),
-        person_mask=None, part_labels=None)
-
-
-def distort_mask(
-    mask: Bool[np.ndarray, 'h w'], camera: Camera
-) -> Bool[np.ndarray, 'h w']:
-    """Return a mask of the pinhole image in the pixels of the camera's own image."""
-    if not camera.is_distorted:
-        return mask
-    rays = camera.ray_grid()
-    u = np.rint(rays[..., 0] * camera.fx + camera.cx).astype(np.int64)
-    v = np.rint(rays[..., 1] * camera.fy + camera.cy).astype(np.int64)
-    inside = (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
-    return inside & mask[np.where(inside, v, 0), np.where(inside, u, 0)]
 
 
 def _nearest_first(

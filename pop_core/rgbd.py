@@ -69,6 +69,19 @@ def undistort_frame(frame: RgbdFrame) -> RgbdFrame:
     return RgbdFrame(rgb, depth_m, camera.without_distortion(), frame.stamp_ns)
 
 
+def distort_mask(
+    mask: Bool[np.ndarray, 'h w'], camera: Camera
+) -> Bool[np.ndarray, 'h w']:
+    """Return a mask of the pinhole image in the pixels of the camera's own image."""
+    if not camera.is_distorted:
+        return mask
+    rays = camera.ray_grid()
+    u = np.rint(rays[..., 0] * camera.fx + camera.cx).astype(np.int64)
+    v = np.rint(rays[..., 1] * camera.fy + camera.cy).astype(np.int64)
+    inside = (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
+    return inside & mask[np.where(inside, v, 0), np.where(inside, u, 0)]
+
+
 def point_cloud(
     frame: RgbdFrame, mask: Bool[np.ndarray, 'h w']
 ) -> tuple[Float[np.ndarray, 'n 3'], Float[np.ndarray, 'n 2']]:

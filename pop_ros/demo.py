@@ -150,7 +150,7 @@ def _draw_frame(
     scene: SyntheticScene, published: RecordedFrame, model: BodyModel
 ) -> DemoFrame:
     picture = four_panels(
-        scene.frame, shown_bodies(published, scene.frame, model.f), model.f)
+        scene.frame, shown_bodies(published, scene.frame, model), model.f)
     truth = scene.people[0]
     to_pelvis = np.linalg.norm(published.joints[:, PELVIS] - truth.joints[PELVIS], axis=1)
     nearest = published.joints[int(to_pelvis.argmin())]

@@ -12,7 +12,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pop_core.body.joints import N_JOINTS
-from pop_core.fitting.joint_state import joint_states
+from pop_core.body.model import BodyModel
+from pop_core.fitting.joint_state import fitted_joint_states
 from pop_core.geometry.camera import Camera
 from pop_core.rendering.depth_renderer import render_depth
 from pop_core.rendering.shown_body import ShownBody
@@ -58,22 +59,22 @@ def read_bodies(bag: Path) -> dict[int, RecordedFrame]:
 
 
 def shown_bodies(
-    recorded: RecordedFrame, frame: RgbdFrame, f: Int[np.ndarray, 'm 3']
+    recorded: RecordedFrame, frame: RgbdFrame, model: BodyModel
 ) -> list[ShownBody]:
     """Return recorded people ready to draw; joint states follow from geometry.
 
     Args:
         recorded: What was published for this frame.
         frame: The frame itself.
-        f: Triangles of the mesh that was published.
+        model: Body whose mesh was published.
     """
     bodies = []
     for corners, person, joints in zip(
         recorded.triangles, recorded.ids, recorded.joints, strict=False
     ):
-        vertices = mesh_vertices(corners, f)
-        rendered = render_depth(vertices, f, frame.camera)
-        state = joint_states(joints, rendered, frame.depth_m, frame.camera)
+        vertices = mesh_vertices(corners, model.f)
+        rendered = render_depth(vertices, model.f, frame.camera)
+        state = fitted_joint_states(model, joints, rendered, frame.depth_m, frame.camera)
         points = recorded.cloud[recorded.cloud['person'] == person]
         bodies.append(ShownBody(vertices, joints, state, cloud_mask(points, frame.camera)))
     return bodies

@@ -25,7 +25,7 @@ from pop_core.rendering.depth_renderer import render_depth
 from pop_core.synthesis.cameras import CameraRange, draw_camera
 from pop_core.synthesis.layouts import SceneConfig
 from pop_core.synthesis.people import actor_at, draw_actor, moved_parameters
-from pop_core.synthesis.visibility import joint_states, shared_states
+from pop_core.rendering.joint_visibility import joint_states, shared_states
 
 PATCH_M = 0.03
 NOSE_ROW = SHARED_NAMES.index('head')

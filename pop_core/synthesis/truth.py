@@ -13,12 +13,12 @@ from pop_core.body.model import BodyModel, BodyParameters, shared_points
 from pop_core.estimate import JointState
 from pop_core.geometry.transform import transform_points
 from pop_core.rendering.depth_renderer import RenderedDepth, render_depth
+from pop_core.rendering.joint_visibility import joint_states, shared_states
 from pop_core.synthesis.blocks import Surface, block_surface
 from pop_core.synthesis.layouts import Layout
 from pop_core.synthesis.people import moved_parameters
 from pop_core.synthesis.rooms import room_surfaces
 from pop_core.synthesis.shading import Stage, joined
-from pop_core.synthesis.visibility import joint_states, shared_states
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,96 @@
+"""From keypoints and depth to bodies, on a synthetic scene and at its edges."""
+
+import numpy as np
+import pytest
+
+from pop_core.body.default_body import default_body
+from pop_core.estimate import EstimateStatus, FrameResult, JointState
+from pop_core.keypoints.detection import Detection
+from pop_core.pipeline import BodyPipeline
+from pop_core.retrieval.default_library import default_library
+from pop_core.rgbd import RgbdFrame
+from pop_core.synthesis.scene_config import SceneConfig
+from pop_core.synthesis.scenes import SyntheticScene, synthesise_scene
+
+
+class Given:
+    """A keypoint source that says what it is told."""
+
+    def __init__(self, detections: list[Detection]) -> None:
+        self.detections = detections
+
+    def detect(self, frame: RgbdFrame) -> list[Detection]:  # noqa: ARG002
+        return self.detections
+
+
+@pytest.fixture(scope='module')
+def scene() -> SyntheticScene:
+    config = SceneConfig(people=(2, 2), pose_shares=(('standing', 1.0),),
+                         sensors=('structured_light',), child_share=0.0)
+    return synthesise_scene(default_body(), 11, config)
+
+
+def run(frame: RgbdFrame, detections: list[Detection]) -> FrameResult:
+    pipeline = BodyPipeline(default_body(), default_library(), Given(detections))
+    return pipeline.process(frame)
+
+
+@pytest.fixture(scope='module')
+def result(scene: SyntheticScene) -> FrameResult:
+    return run(scene.frame, [d for d in scene.detections() if d is not None])
+
+
+def test_everybody_is_found_where_they_are(scene: SyntheticScene, result: FrameResult) -> None:
+    assert len(result.bodies) == len(scene.people)
+    for person in scene.people:
+        off = [np.linalg.norm(b.joints[0] - person.joints[0]) for b in result.bodies]
+        assert min(off) < 0.1  # a hand's width, with sensor and keypoint noise
+
+
+def test_bodies_come_nearest_first_with_masks_of_their_own(result: FrameResult) -> None:
+    depth = [b.joints[0, 2] for b in result.bodies]
+    assert depth == sorted(depth)
+    assert not (result.bodies[0].mask & result.bodies[1].mask).any()
+
+
+def test_masks_lie_on_the_people(scene: SyntheticScene, result: FrameResult) -> None:
+    people = np.any([p.mask for p in scene.people], axis=0)
+    found = np.any([b.mask for b in result.bodies], axis=0)
+    assert (found & people).sum() / found.sum() > 0.9
+
+
+def test_hidden_joints_are_called_hidden(scene: SyntheticScene, result: FrameResult) -> None:
+    agree = []
+    for person in scene.people:
+        body = min(result.bodies, key=lambda b: np.linalg.norm(b.joints[0] - person.joints[0]))
+        known = body.joint_state != JointState.UNKNOWN
+        agree.append(((body.joint_state == 0) == (person.joint_state == 0))[known])
+    assert np.mean(np.concatenate(agree)) > 0.8
+
+
+def test_the_same_frame_gives_the_same_bodies(scene: SyntheticScene, result: FrameResult) -> None:
+    again = run(scene.frame, [d for d in scene.detections() if d is not None])
+    for first, second in zip(result.bodies, again.bodies, strict=True):
+        np.testing.assert_array_equal(first.vertices, second.vertices)
+
+
+def test_nobody_detected_is_an_empty_result(scene: SyntheticScene) -> None:
+    empty = run(scene.frame, [])
+    assert empty.bodies == ()
+    assert empty.statuses == ()
+
+
+def test_a_person_without_depth_is_a_status_not_an_exception(scene: SyntheticScene) -> None:
+    blind = RgbdFrame(scene.frame.rgb, np.full_like(scene.frame.depth_m, np.nan),
+                      scene.frame.camera)
+    found = run(blind, [d for d in scene.detections() if d is not None])
+    assert found.bodies == ()
+    assert set(found.statuses) == {EstimateStatus.TOO_FEW_JOINTS}
+
+
+def test_keypoints_on_an_empty_wall_are_nobody(scene: SyntheticScene) -> None:
+    """A poster of a person: flat depth where a body should be."""
+    wall = RgbdFrame(scene.frame.rgb, np.full_like(scene.frame.depth_m, 3.0), scene.frame.camera)
+    found = run(wall, [d for d in scene.detections() if d is not None])
+    for body in found.bodies:
+        assert np.isfinite(body.vertices).all()
