@@ -85,7 +85,7 @@ def main() -> None:
     called = next((word for word in arguments if not word.startswith('-')), None)
     try:
         build_app(called)(arguments, prog_name='pop')
-    except PopError as error:
+    except (PopError, OSError) as error:  # a file that cannot be read or written, for example
         sys.stderr.write(f'pop {called}: {error}\n')
         sys.exit(BAD_INPUT)
     except ModuleNotFoundError as error:

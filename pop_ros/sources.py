@@ -100,5 +100,6 @@ def _network_detector(path: Path, decoder: str | None) -> KeypointDetector:
     from pop_core.keypoints.onnx_detector import OnnxKeypointDetector
 
     if path.suffix != '.onnx' or not path.is_file():
-        raise SourceError(f'keypoints: expected {SOURCES}, found {path}, which is no such file')
+        why = 'is not there' if not path.is_file() else 'does not end in .onnx'
+        raise SourceError(f'keypoints: expected {SOURCES}, found {path}, which {why}')
     return OnnxKeypointDetector(path, decoder)

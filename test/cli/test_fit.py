@@ -145,7 +145,7 @@ def test_an_output_that_is_a_file_is_a_bad_input_not_a_crash(tmp_path, scene):
 @pytest.mark.parametrize(
     ('arguments', 'sentence'),
     [
-        (['--keypoints', 'nothing.onnx'], 'nothing.onnx, which is no such file'),
+        (['--keypoints', 'nothing.onnx'], 'nothing.onnx, which is not there'),
         (['--set', 'max_people'], 'expected NAME=VALUE'),
         (['--set', 'max_people=many'], 'max_people: expected int'),
         (['--set', 'max_people=0'], 'max_people: expected 1 to'),
