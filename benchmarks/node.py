@@ -36,7 +36,7 @@ from pop_ros.from_messages import frame_from_messages
 from pop_ros.image_messages import color_message, depth_message, info_message
 from pop_ros.inputs import COLOR, DEPTH, INFO
 from pop_ros.node_arguments import SourceArguments
-from pop_ros.node_config import MeshConfig
+from pop_ros.node_config import NodeConfig
 from pop_ros.pairing import FramePairer
 from pop_ros.qos import output_qos
 from pop_ros.replay_dds import NodeProcess
@@ -75,7 +75,7 @@ def measure_messages(scene: SyntheticScene) -> Rows:
     """Return the time to build and to publish every output of one person, with a subscriber."""
     rclpy.init()
     node = rclpy.create_node('benchmark')
-    messages = BodyMessages(default_body(), MeshConfig())
+    messages = BodyMessages(default_body(), NodeConfig())
     result = FrameResult((truth_as_estimate(scene),), (), {})
     rows: Rows = []
     for name, kind in OUTPUT_TYPES.items():

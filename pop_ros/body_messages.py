@@ -19,17 +19,20 @@ from pop_core.rgbd import RgbdFrame, undistort_frame
 from pop_ros import pop_messages, to_messages
 from pop_ros.cdr import MarkerTemplate
 from pop_ros.image_messages import color_message
-from pop_ros.node_config import MeshConfig
+from pop_ros.node_config import NodeConfig
 from pop_ros.person_ids import PersonIds
 from pop_ros.skeleton_markers import skeleton_message
+from pop_ros.tf_messages import tf2_msgs, transforms_message
 
 MESH, JOINTS, CLOUD, BODIES = 'mesh', 'joints', 'cloud', 'bodies'
-SKELETON, OVERLAY = 'skeleton', 'overlay'
+SKELETON, OVERLAY, TF = 'skeleton', 'overlay', 'tf'
 # What `pop replay` records; the other outputs are pictures of the same.
 RECORDED_TYPES: dict[str, Any] = {MESH: Marker, JOINTS: PoseArray, CLOUD: PointCloud2}
 if pop_messages.pop_msgs is not None:
     RECORDED_TYPES[BODIES] = pop_messages.pop_msgs.BodyArray
 OUTPUT_TYPES: dict[str, Any] = {**RECORDED_TYPES, SKELETON: MarkerArray, OVERLAY: Image}
+if tf2_msgs is not None:
+    OUTPUT_TYPES[TF] = tf2_msgs.TFMessage
 MAX_TEMPLATES = 64  # ids never return; templates of people who left are of no use
 
 # A topic's name without the node's, and a message or its serialised bytes.
@@ -39,16 +42,16 @@ Output = tuple[str, Any]
 class BodyMessages:
     """Turns results into messages and remembers who was there in the frame before."""
 
-    def __init__(self, model: BodyModel, mesh: MeshConfig) -> None:
+    def __init__(self, model: BodyModel, config: NodeConfig) -> None:
         """Prepare messages of a body model's meshes."""
-        self._model, self._mesh = model, mesh
+        self._model, self._config = model, config
         self._ids = PersonIds()
         self._shown: set[int] = set()
         self._templates: dict[tuple[int, str], MarkerTemplate] = {}
 
-    def configure(self, mesh: MeshConfig) -> None:
+    def configure(self, config: NodeConfig) -> None:
         """Take over changed settings; ids stay."""
-        self._mesh = mesh
+        self._config = config
         self._templates.clear()
 
     def reset(self) -> None:
@@ -77,6 +80,7 @@ class BodyMessages:
             CLOUD: lambda: [to_messages.cloud_message(frame, bodies, ids, header)],
             BODIES: lambda: [pop_messages.bodies_message(bodies, ids, header)],
             SKELETON: lambda: [skeleton_message(bodies, ids, gone, header)],
+            TF: lambda: [transforms_message(bodies, ids, header, self._config.tf.frames)],
         }
         chosen = [(name, make()) for name, make in makers.items() if name in wanted]
         return picture + [(name, message) for name, made in chosen for message in made]
@@ -92,7 +96,7 @@ class BodyMessages:
     ) -> list[Any]:
         messages: list[Any] = [
             to_messages.delete_marker(number, stamp_ns, frame_id) for number in sorted(gone)]
-        if self._mesh.detail == 'off':
+        if self._config.mesh.detail == 'off':
             return messages
         for body, number in zip(result.bodies, ids, strict=True):
             template = self._template(number, frame_id)
@@ -100,7 +104,7 @@ class BodyMessages:
         return messages
 
     def _triangles(self, body: BodyEstimate) -> np.ndarray:
-        if self._mesh.detail == 'reduced':
+        if self._config.mesh.detail == 'reduced':
             coarse = body.vertices[self._model.fit_vertices]
             return to_messages.triangle_points(coarse, self._model.fit_faces)
         return to_messages.triangle_points(body.vertices, self._model.f)
@@ -110,6 +114,6 @@ class BodyMessages:
         if key not in self._templates:
             if len(self._templates) >= MAX_TEMPLATES:
                 self._templates.clear()
-            marker = to_messages.mesh_marker(person_id, frame_id, self._mesh.lifetime_s)
+            marker = to_messages.mesh_marker(person_id, frame_id, self._config.mesh.lifetime_s)
             self._templates[key] = MarkerTemplate(marker)
         return self._templates[key]

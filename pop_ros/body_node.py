@@ -20,7 +20,7 @@ from std_srvs.srv import SetBool, Trigger
 from pop_core.body.model import BodyModel
 from pop_core.config import PipelineConfig
 from pop_core.errors import PopError
-from pop_ros.body_messages import OUTPUT_TYPES
+from pop_ros.body_messages import OUTPUT_TYPES, TF
 from pop_ros.diagnostics import diagnostic_array
 from pop_ros.explanation import explain_missing_pairs
 from pop_ros.frame_fitter import FrameFitter
@@ -68,7 +68,7 @@ class PopNode(Node):
         self._inputs = RgbdInputs(self, self._config.sync.slop_s, self._on_frame)
         self._outputs = {
             name: self.create_publisher(
-                kind, f'~/{name}', output_qos(),
+                kind, '/tf' if name == TF else f'~/{name}', output_qos(),
                 qos_overriding_options=QoSOverridingOptions.with_default_policies())
             for name, kind in OUTPUT_TYPES.items()
         }
@@ -77,6 +77,7 @@ class PopNode(Node):
         self.create_service(Trigger, '~/reset', self._on_reset)
         self._worker: Worker[RgbdMessages] = Worker(self._fit, self._on_error, self._prepare)
         self._worker.start()
+        self._warn_of_missing_tf()
         # Steady timers: a simulated clock that stands still must not silence the node.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(POLL_S, self._inputs.poll, clock=steady)
@@ -95,8 +96,13 @@ class PopNode(Node):
 
     def _on_settings(self) -> None:
         self._changed.set()
+        self._warn_of_missing_tf()
         if round(self._config.sync.slop_s * 1e9) != self._inputs.pairer.slop_ns:
             self._inputs.reset(self._config.sync.slop_s)
+
+    def _warn_of_missing_tf(self) -> None:
+        if self._config.tf.frames != 'off' and TF not in self._outputs:
+            self.log.warning('tf.frames: tf2_msgs is not installed, nothing goes to /tf')
 
     def _on_enable(
         self, request: SetBool.Request, response: SetBool.Response
@@ -125,9 +131,10 @@ class PopNode(Node):
         return self._config.enabled and (not self._config.lazy or bool(self._wanted()))
 
     def _wanted(self) -> list[str]:
-        if not self._config.lazy:
-            return list(self._outputs)
-        return [n for n, publisher in self._outputs.items() if publisher.get_subscription_count()]
+        tf_off = {TF} if self._config.tf.frames == 'off' else set()
+        return [
+            name for name, publisher in self._outputs.items() if name not in tf_off
+            and (not self._config.lazy or publisher.get_subscription_count())]
 
     def _on_frame(self, messages: RgbdMessages) -> None:
         self._statistics.add_pair()
@@ -158,7 +165,7 @@ class PopNode(Node):
             f'preparing (keypoints: {self._arguments.keypoints}); the first start generates the '
             'pose library and compiles kernels, later ones read them from the cache')
         fitter = FrameFitter(
-            self._arguments, self._settings.pipeline_config, self._config.mesh,
+            self._arguments, self._settings.pipeline_config, self._config,
             self._say_progress)
         self._fitter = fitter
         self._publish_model(fitter.model)
@@ -183,7 +190,7 @@ class PopNode(Node):
         assert self._fitter is not None
         if self._changed.is_set():
             self._changed.clear()
-            self._fitter.configure(self._settings.pipeline_config, self._config.mesh)
+            self._fitter.configure(self._settings.pipeline_config, self._config)
         if self._restart.is_set():
             self._restart.clear()
             self._fitter.reset()

@@ -13,7 +13,7 @@ from pop_core.pipeline import BodyPipeline
 from pop_ros.body_messages import RECORDED_TYPES, BodyMessages, Output
 from pop_ros.from_messages import frame_from_messages
 from pop_ros.node_arguments import SourceArguments
-from pop_ros.node_config import MeshConfig
+from pop_ros.node_config import NodeConfig
 from pop_ros.sources import make_detector, make_pipeline
 
 
@@ -37,7 +37,7 @@ class FrameFitter:
         self,
         arguments: SourceArguments,
         pipeline_config: PipelineConfig,
-        mesh: MeshConfig,
+        config: NodeConfig,
         progress: Callable[[float, str], None] | None = None,
     ) -> None:
         """Load the keypoint source, body model and pose library.
@@ -50,19 +50,19 @@ class FrameFitter:
         detector = make_detector(
             arguments.keypoints, arguments.keypoints_dir, arguments.decoder)
         self._pipeline = make_pipeline(detector, pipeline_config, progress=progress)
-        self._messages = BodyMessages(self._pipeline.model, mesh)
+        self._messages = BodyMessages(self._pipeline.model, config)
 
     @property
     def model(self) -> BodyModel:
         """Return the body model that is fitted."""
         return self._pipeline.model
 
-    def configure(self, pipeline_config: PipelineConfig, mesh: MeshConfig) -> None:
+    def configure(self, pipeline_config: PipelineConfig, config: NodeConfig) -> None:
         """Take over changed settings; model, library and keypoint source stay loaded."""
         old = self._pipeline
         self._pipeline = BodyPipeline(
             old.model, old.library, old.detector, pipeline_config, old.fitter.prior)
-        self._messages.configure(mesh)
+        self._messages.configure(config)
 
     def reset(self) -> None:
         """Start the ids of people anew."""

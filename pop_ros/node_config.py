@@ -9,6 +9,7 @@ from pop_core.settings import setting
 
 RELIABILITIES = ('auto', 'reliable', 'best_effort')
 MESH_DETAILS = ('full', 'reduced', 'off')
+TF_FRAMES = ('off', 'people', 'joints')
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +41,21 @@ class MeshConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class TfConfig:
+    """What is published on /tf."""
+
+    frames: str = setting(
+        'off', about='TF frames: off, people (body_<id>), joints (also body_<id>/<joint>).')
+
+
+@dataclass(frozen=True, slots=True)
 class NodeConfig:
     """Settings of the node around the pipeline."""
 
     sync: SyncConfig = field(default_factory=SyncConfig)
     input: InputConfig = field(default_factory=InputConfig)
     mesh: MeshConfig = field(default_factory=MeshConfig)
+    tf: TfConfig = field(default_factory=TfConfig)
     lazy: bool = setting(
         True, about='Work only while somebody subscribes to an output.')
     enabled: bool = setting(True, about='Whether frames are processed.')
@@ -53,6 +63,7 @@ class NodeConfig:
     def __post_init__(self) -> None:
         _check_choice('input.reliability', self.input.reliability, RELIABILITIES)
         _check_choice('mesh.detail', self.mesh.detail, MESH_DETAILS)
+        _check_choice('tf.frames', self.tf.frames, TF_FRAMES)
 
 
 def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:

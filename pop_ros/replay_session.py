@@ -15,7 +15,7 @@ from pop_ros.bag_topics import RgbdTopics, find_topics
 from pop_ros.bag_writer import BagWriter
 from pop_ros.frame_fitter import FrameFitter
 from pop_ros.node_arguments import SourceArguments
-from pop_ros.node_config import MeshConfig
+from pop_ros.node_config import NodeConfig
 from pop_ros.replay import ReplaySummary, replay_every_frame
 from pop_ros.replay_dds import READY_S, DdsPlayer, NodeProcess, bag_transports
 
@@ -77,7 +77,7 @@ def _every_frame(
     request: ReplayRequest, bag: BagReader, topics: RgbdTopics, on_message: Callable[[], None]
 ) -> ReplaySummary:
     writer = BagWriter(request.out, request.ros1)
-    fitter = FrameFitter(request.sources, PipelineConfig(), MeshConfig())
+    fitter = FrameFitter(request.sources, PipelineConfig(), NodeConfig())
     with writer:
         return replay_every_frame(
             bag, topics, fitter, writer, slop_s=request.slop_s, on_message=on_message)

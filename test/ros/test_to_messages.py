@@ -14,7 +14,7 @@ from pop_core.geometry.camera import Camera
 from pop_core.rgbd import RgbdFrame
 from pop_ros.body_messages import BodyMessages
 from pop_ros.from_messages import decode_color, stamp_ns
-from pop_ros.node_config import MeshConfig
+from pop_ros.node_config import MeshConfig, NodeConfig
 from pop_ros.person_ids import PersonIds
 from pop_ros.skeleton_markers import HIDDEN
 from pop_ros.to_messages import CLOUD_TYPE, body_poses
@@ -67,8 +67,8 @@ def test_poses_carry_position_and_orientation_of_every_joint(model: BodyModel) -
 def test_every_message_has_stamp_and_frame_of_the_image(
     model: BodyModel, frame: RgbdFrame
 ) -> None:
-    messages = BodyMessages(model, MeshConfig())
-    messages.configure(MeshConfig(lifetime_s=1.0))
+    messages = BodyMessages(model, NodeConfig())
+    messages.configure(NodeConfig(mesh=MeshConfig(lifetime_s=1.0)))
     outputs = dict(messages.build(result(body(model)), frame, 'optical', ('joints', 'cloud')))
     assert set(outputs) == {'joints', 'cloud'}
     for message in outputs.values():
@@ -80,7 +80,7 @@ def test_the_cloud_holds_each_measured_pixel_of_each_person_once(
     model: BodyModel, frame: RgbdFrame
 ) -> None:
     people = result(body(model), body(model, x_m=1.5))
-    messages = BodyMessages(model, MeshConfig())
+    messages = BodyMessages(model, NodeConfig())
     (_, cloud), = messages.build(people, frame, 'optical', ('cloud',))
     points = np.frombuffer(cloud.data.tobytes(), CLOUD_TYPE)
     mask = people.bodies[0].mask & np.isfinite(frame.depth_m)
@@ -97,7 +97,7 @@ def test_the_cloud_holds_each_measured_pixel_of_each_person_once(
 def test_a_person_who_leaves_is_deleted_once_and_an_empty_room_is_silent(
     model: BodyModel, frame: RgbdFrame
 ) -> None:
-    messages = BodyMessages(model, MeshConfig())
+    messages = BodyMessages(model, NodeConfig())
     messages.build(result(body(model), body(model, 1.5)), frame, 'optical')
     gone = messages.build(result(), frame, 'optical')
     deleted = [m.id for name, m in gone if name == 'mesh']
@@ -112,7 +112,7 @@ def test_bones_of_hidden_joints_are_drawn_dark_and_the_id_above_the_head(
 ) -> None:
     person = body(model)
     person.joint_state[JOINT_INDEX['left_knee']] = JointState.SCENE_OCCLUDED
-    messages = BodyMessages(model, MeshConfig())
+    messages = BodyMessages(model, NodeConfig())
     (_, array), = messages.build(result(person), frame, 'optical', ('skeleton',))
     bones, label = array.markers
     ends = np.array([[p.x, p.y, p.z] for p in bones.points])
@@ -130,7 +130,7 @@ def test_bones_of_hidden_joints_are_drawn_dark_and_the_id_above_the_head(
 def test_the_overlay_comes_with_every_frame_and_shows_the_body(
     model: BodyModel, frame: RgbdFrame
 ) -> None:
-    messages = BodyMessages(model, MeshConfig())
+    messages = BodyMessages(model, NodeConfig())
     (_, empty), = messages.build(result(), frame, 'optical', ('overlay',))
     assert np.array_equal(decode_color(empty), frame.rgb)
     outputs = dict(messages.build(result(body(model)), frame, 'optical', ('overlay',)))
@@ -142,7 +142,7 @@ def test_the_overlay_comes_with_every_frame_and_shows_the_body(
 def test_after_a_reset_ids_start_anew_and_old_ones_are_removed(
     model: BodyModel, frame: RgbdFrame
 ) -> None:
-    messages = BodyMessages(model, MeshConfig())
+    messages = BodyMessages(model, NodeConfig())
     messages.build(result(body(model), body(model, 1.5)), frame, 'optical', ())
     messages.build(result(body(model, 1.5)), frame, 'optical', ())
     messages.reset()
@@ -155,7 +155,7 @@ def test_after_a_reset_ids_start_anew_and_old_ones_are_removed(
 def test_mesh_detail_chooses_the_triangles(
     model: BodyModel, frame: RgbdFrame, detail: str, triangles: str
 ) -> None:
-    messages = BodyMessages(model, MeshConfig(detail=detail))
+    messages = BodyMessages(model, NodeConfig(mesh=MeshConfig(detail=detail)))
     (_, data), = messages.build(result(body(model)), frame, 'optical', ('mesh',))
     size = getattr(model, triangles).size * 24
     assert size < len(data) < size + 300
@@ -164,7 +164,7 @@ def test_mesh_detail_chooses_the_triangles(
 
 
 def test_without_mesh_the_other_outputs_still_come(model: BodyModel, frame: RgbdFrame) -> None:
-    messages = BodyMessages(model, MeshConfig(detail='off'))
+    messages = BodyMessages(model, NodeConfig(mesh=MeshConfig(detail='off')))
     names = [name for name, _ in messages.build(result(body(model)), frame, 'optical')]
     assert 'mesh' not in names
     assert {'joints', 'cloud'} <= set(names)
