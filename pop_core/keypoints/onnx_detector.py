@@ -72,6 +72,7 @@ def choose_decoder(spec: NetworkSpec, name: str | None, where: str) -> NetworkDe
 
 
 def _load(path: Path) -> onnxruntime.InferenceSession:
+    onnxruntime.disable_telemetry_events()  # a robot's perception tells nobody what it runs
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = THREADS
     options.inter_op_num_threads = 1
