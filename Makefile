@@ -4,7 +4,8 @@
 #   make test         the whole test suite
 #   make check        ruff and mypy
 #   make bench-gate   accuracy and speed on a few scenes against the committed baseline
-#   make messages     the ROS messages of msg_defs without ROS (needs g++ and python3-dev)
+#   make messages     the ROS messages of msg_defs, and tf2_msgs for tests, without ROS (needs g++
+#                     and python3-dev)
 #   make docs         write the generated pages of docs/ anew
 #
 # Needs Python 3.10 to 3.13 with venv, and make. Choose another Python with PYTHON=, another place
@@ -35,6 +36,8 @@ bench-gate: $(VENV)/.tools
 
 messages: $(BIN)/python
 	scripts/build_messages.sh build/pop_msgs $(BIN)/python
+	POP_MESSAGE_TOOLS=$(abspath build/pop_msgs/tools) \
+	  scripts/build_messages.sh build/tf2_msgs $(BIN)/python test/support/tf2_msgs
 
 docs: $(VENV)/.tools
 	$(BIN)/python -m scripts.write_docs
