@@ -145,8 +145,8 @@ class RgbdInputs:
         self.reset(self.pairer.slop_ns / 1e9)
 
     def reset(self, slop_s: float) -> None:
-        """Start pairing anew; the CameraInfo stays."""
-        self.pairer = FramePairer(round(slop_s * 1e9))
+        """Start pairing anew; the CameraInfo and the counts stay."""
+        self.pairer = FramePairer(round(slop_s * 1e9), self.pairer.statistics)
         self._without_info = None
         self.last_frame_s = time.monotonic()
 

@@ -102,13 +102,13 @@ class _Waiting(Generic[ItemT]):
 class FramePairer(Generic[ItemT]):
     """Collects colour and depth images and hands out pairs in the order of colour stamps."""
 
-    def __init__(self, slop_ns: int) -> None:
-        """Accept pairs whose stamps differ by at most `slop_ns` [ns]."""
+    def __init__(self, slop_ns: int, statistics: PairStatistics | None = None) -> None:
+        """Accept pairs whose stamps differ by at most `slop_ns` [ns]; count on in `statistics`."""
         self.slop_ns = slop_ns
         self.wait_ns = slop_ns + PATIENCE_NS
         self.color_stream = Stream()
         self.depth_stream = Stream()
-        self.statistics = PairStatistics()
+        self.statistics = statistics or PairStatistics()
         self._colors: list[_Waiting[ItemT]] = []
         self._depths: list[_Waiting[ItemT]] = []
         # Those of used images too: a miss is explained by where depth was, not by what is left.

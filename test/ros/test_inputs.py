@@ -109,6 +109,9 @@ def test_stamps_beyond_the_slop_give_an_explanation_with_the_gap(
     text = explain_missing_pairs(receiver.inputs.reports(), receiver.inputs.pairer, 5.0)
     finish(camera)
     assert not receiver.frames
+    missed = receiver.inputs.pairer.statistics.missed
+    receiver.inputs.leave()
+    assert receiver.inputs.pairer.statistics.missed == missed
     assert 'nearest depth image is 0.012 s away' in text
     assert '/color/image' in text
     assert 'camera (reliable)' in text
