@@ -28,7 +28,7 @@ setup(
     maintainer_email='maintainers@pop.invalid',
     python_requires='>=3.10',
     packages=find_packages(include=['pop_core*', 'pop_ros*']),
-    package_data={'pop_core': ['data/*', 'py.typed'], 'pop_ros': ['py.typed']},
+    package_data={'pop_core': ['data/*', 'py.typed'], 'pop_ros': ['data/*', 'py.typed']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/pop_ros']),
         (f'share/{NAME}', ['package.xml']),

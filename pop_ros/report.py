@@ -1,4 +1,4 @@
-"""One-page HTML reports that need no other file: text, tables, pictures and a film strip."""
+"""One-page HTML reports that need no other file: text, tables, pictures, film strips, 3D views."""
 
 from __future__ import annotations
 
@@ -11,7 +11,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from pop_ros.report3d import SceneFrame, scene_html, scene_scripts
+
 JPEG_QUALITY = 86
+# The browser itself refuses whatever a page would fetch.
+POLICY = (
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'")
 STYLE = """
 :root { color-scheme: light dark; --ink: #1c2026; --paper: #fafaf8; --line: #d8dade; }
 @media (prefers-color-scheme: dark) {
@@ -49,6 +54,7 @@ class Report:
         """Begin a page with a title and a sentence."""
         self._title = title
         self._parts = [f'<h1>{html.escape(title)}</h1><p>{html.escape(lead)}</p>']
+        self._scripts = f'<script>{FILM_SCRIPT}</script>'
 
     def heading(self, text: str) -> None:
         """Add a heading."""
@@ -89,6 +95,12 @@ class Report:
             'aria-label="frame"><figcaption></figcaption>'
             f'<script type="application/json">{data}</script></figure>')
 
+    def scenes(self, scenes: Sequence[SceneFrame], f: np.ndarray) -> None:
+        """Add a 3D view of frames, of which a slider shows one; `f` are the meshes' triangles."""
+        if '.scene3d' not in self._scripts:
+            self._scripts += scene_scripts()
+        self._parts.append(scene_html(scenes, f))
+
     def write(self, path: Path) -> None:
         """Write the page.
 
@@ -98,9 +110,10 @@ class Report:
         body = '\n'.join(self._parts)
         path.write_text(
             f'<!doctype html><html lang="en"><meta charset="utf-8">'
+            f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
             f'<meta name="viewport" content="width=device-width">'
             f'<title>{html.escape(self._title)}</title><style>{STYLE}</style>'
-            f'<body>{body}<script>{FILM_SCRIPT}</script></body></html>\n', encoding='utf-8')
+            f'<body>{body}{self._scripts}</body></html>\n', encoding='utf-8')
 
 
 def _jpeg(rgb: np.ndarray) -> str:
