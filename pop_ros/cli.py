@@ -55,6 +55,8 @@ COMMANDS = (
             'Inspect, import and picture body models.'),
     Command('library', 'pop_ros.library_commands', 'app',
             'Build and inspect pose libraries.'),
+    Command('doctor', 'pop_ros.doctor_command', 'doctor',
+            'Check middleware, caches, message packages and cameras; say what to do.'),
     Command('version', 'pop_ros.version_command', 'version',
             'Print the versions of what results depend on.'),
 )

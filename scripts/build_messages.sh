@@ -33,8 +33,8 @@ version=$("$tools/bin/python" -c 'import sys; print("%d.%d" % sys.version_info[:
 export AMENT_PREFIX_PATH="$tools" CMAKE_PREFIX_PATH="$tools"
 "$tools/bin/cmake" -S "$package" -B "$out/cmake" -Wno-dev \
   -DPython3_EXECUTABLE="$tools/bin/python" -DPython3_FIND_VIRTUALENV=ONLY \
-  -DCMAKE_INSTALL_PREFIX="$out/install" >"$out/configure.log" || { cat "$out/configure.log" >&2; exit 1; }
-"$tools/bin/cmake" --build "$out/cmake" -j2 --target install >"$out/build.log" || { tail -40 "$out/build.log" >&2; exit 1; }
+  -DCMAKE_INSTALL_PREFIX="$out/install" >"$out/configure.log" 2>&1 || { cat "$out/configure.log" >&2; exit 1; }
+"$tools/bin/cmake" --build "$out/cmake" -j2 --target install >"$out/build.log" 2>&1 || { tail -40 "$out/build.log" >&2; exit 1; }
 
 cat >"$out/setup.sh" <<SETUP
 export PYTHONPATH="$out/install/lib/python$version/site-packages\${PYTHONPATH:+:\$PYTHONPATH}"
