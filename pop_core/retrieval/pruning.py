@@ -12,7 +12,8 @@ from jaxtyping import Float, Float32, Int
 
 from pop_core.retrieval import pruning_kernels as kernels
 
-AXES = 4
+AXES = 4  # of the grid
+KEYS = 12  # projections compared before joints are
 CELLS = 40  # along each axis; poses beyond the ends share the last cell
 
 
@@ -31,11 +32,13 @@ class PoseThinner:
         """
         self.spacing_m, self.wanted, self.count = spacing_m, wanted, 0
         self._axes = _unit_axes(sample)
-        self._low = np.quantile(self._project(sample), 0.5, axis=0) - 0.5 * CELLS * spacing_m
+        middle = np.median(self._project(sample)[:, :AXES], axis=0)
+        self._low = middle - 0.5 * CELLS * spacing_m
         self._shape = np.full(AXES, CELLS)
         self._heads = np.full(CELLS**AXES, -1, dtype=np.int32)
         self._links = np.full(wanted, -1, dtype=np.int32)
         self._accepted = np.empty((wanted, *sample.shape[1:]), dtype=np.float32)
+        self._accepted_keys = np.empty((wanted, self._axes.shape[1]), dtype=np.float32)
 
     @property
     def full(self) -> bool:
@@ -44,17 +47,17 @@ class PoseThinner:
 
     def accept(self, joints: Float32[np.ndarray, 'n s 3']) -> Int[np.ndarray, 'k']:
         """Return the rows of a batch that are accepted, in order."""
-        cells = np.floor((self._project(joints) - self._low) / self.spacing_m).astype(np.int64)
+        keys = self._project(joints)
+        cells = np.floor((keys[:, :AXES] - self._low) / self.spacing_m).astype(np.int64)
         kept = np.empty(len(joints), dtype=np.int64)
         before = self.count
         self.count = int(kernels.keep_apart(
-            joints, np.clip(cells, 0, CELLS - 1), self._shape, self._heads, self._links,
-            self._accepted, before, self.spacing_m, self.wanted, kept))
+            joints, keys, np.clip(cells, 0, CELLS - 1), self._shape, self._heads, self._links,
+            self._accepted, self._accepted_keys, before, self.spacing_m, self.wanted, kept))
         return kept[: self.count - before]
 
-    def _project(self, joints: Float32[np.ndarray, 'n s 3']) -> Float[np.ndarray, 'n d']:
-        flat = joints.reshape(len(joints), -1).astype(np.float64)
-        return np.asarray(flat @ self._axes)
+    def _project(self, joints: Float32[np.ndarray, 'n s 3']) -> Float32[np.ndarray, 'n d']:
+        return np.asarray(joints.reshape(len(joints), -1) @ self._axes)
 
 
 def nearest_distances(
@@ -66,11 +69,12 @@ def nearest_distances(
     return out
 
 
-def _unit_axes(sample: Float32[np.ndarray, 'n s 3']) -> Float[np.ndarray, 'x d']:
-    """Return projections that no pair of poses moves along by more than its distance."""
+def _unit_axes(sample: Float32[np.ndarray, 'n s 3']) -> Float32[np.ndarray, 'x d']:
+    """Return projections along which no two poses lie farther apart than their distance."""
     n, s, _ = sample.shape
     flat = sample.reshape(n, -1).astype(np.float64)
     _, _, directions = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)
-    per_joint = directions[:AXES].reshape(AXES, s, 3)
+    per_joint = directions[:KEYS].reshape(-1, s, 3)
     length = np.linalg.norm(per_joint, axis=2, keepdims=True)
-    return np.asarray((per_joint / np.maximum(length, 1e-9) / s).reshape(AXES, -1).T)
+    unit = per_joint / np.maximum(length, 1e-9) / s
+    return np.ascontiguousarray(unit.reshape(len(unit), -1).T.astype(np.float32))

@@ -7,18 +7,23 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def keep_apart(joints, cells, shape, heads, links, accepted, count, spacing, wanted, kept):
+def keep_apart(
+    joints, keys, cells, shape, heads, links, accepted, accepted_keys, count, spacing, wanted, kept
+):
     """Accept, in order, every pose that is farther than `spacing` from all accepted ones.
 
-    Poses nearer than the spacing lie in cells that touch, so only those are looked at.
+    Poses nearer than the spacing lie in cells that touch, so only those are looked at, and of
+    these only the ones whose keys are near.
 
     Args:
         joints: Joints (n,s,3) float32 [m] of new poses.
+        keys: Projections (n,k) float32 [m] of new poses, none steeper than the distance.
         cells: Grid cell (n,d) of each new pose.
         shape: Number of cells along each of the d axes.
         heads: Latest accepted pose of each cell (flat), -1 for none; updated.
         links: The accepted pose before each accepted one in its cell; updated.
         accepted: Joints (m,s,3) of accepted poses; filled from `count` on.
+        accepted_keys: Keys (m,k) of accepted poses; filled likewise.
         count: Number of accepted poses so far.
         spacing: Smallest mean joint distance [m] of two accepted poses.
         wanted: Stop at this many accepted poses.
@@ -35,7 +40,8 @@ def keep_apart(joints, cells, shape, heads, links, accepted, count, spacing, wan
             break
         free = True
         for neighbour in range(neighbours):
-            cell, rest, inside = 0, neighbour, True
+            # The pose's own cell comes first: a near pose most often shares it.
+            cell, rest, inside = 0, (neighbour + neighbours // 2) % neighbours, True
             for axis in range(d):
                 place = cells[i, axis] + rest % 3 - 1
                 rest //= 3
@@ -43,7 +49,8 @@ def keep_apart(joints, cells, shape, heads, links, accepted, count, spacing, wan
                 cell = cell * shape[axis] + place
             other = heads[cell] if inside else -1
             while other >= 0 and free:
-                free = not _near(joints[i], accepted[other], spacing)
+                if _keys_near(keys[i], accepted_keys[other], spacing):
+                    free = not _near(joints[i], accepted[other], spacing)
                 other = links[other]
             if not free:
                 break
@@ -53,6 +60,7 @@ def keep_apart(joints, cells, shape, heads, links, accepted, count, spacing, wan
         for axis in range(d):
             cell = cell * shape[axis] + cells[i, axis]
         accepted[count] = joints[i]
+        accepted_keys[count] = keys[i]
         links[count] = heads[cell]
         heads[cell] = count
         kept[found] = i
@@ -78,6 +86,14 @@ def nearest_distance(queries, joints, out):
                     break
             best = min(best, total)
         out[i] = best / s
+
+
+@njit(cache=True, nogil=True)
+def _keys_near(a, b, spacing):
+    k = 0
+    while k < a.shape[0] and abs(a[k] - b[k]) <= spacing:
+        k += 1
+    return k == a.shape[0]
 
 
 @njit(cache=True, nogil=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -104,8 +105,10 @@ def _parse_frames(motion: str, width: int) -> Float[np.ndarray, 'n x']:
         raise LibraryFileError(f'expected Frames: and Frame Time:, found {" ".join(head[:4])!r}')
     try:
         frames = int(head[1])
-        numbers = np.array(head[5].split(), dtype=np.float64)
-    except ValueError as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter('error')  # numpy only warns where text is not a number
+            numbers = np.fromstring(head[5], dtype=np.float64, sep=' ')
+    except (ValueError, DeprecationWarning) as error:
         raise LibraryFileError(f'expected rows of numbers, found {error}') from error
     if frames <= 0 or numbers.size != frames * width:
         raise LibraryFileError(
