@@ -38,6 +38,8 @@ messages: $(BIN)/python
 	scripts/build_messages.sh build/pop_msgs $(BIN)/python
 	POP_MESSAGE_TOOLS=$(abspath build/pop_msgs/tools) \
 	  scripts/build_messages.sh build/tf2_msgs $(BIN)/python test/support/tf2_msgs
+	POP_MESSAGE_TOOLS=$(abspath build/pop_msgs/tools) \
+	  scripts/build_messages.sh build/tf2_msgs $(BIN)/python test/support/tf2_msgs
 
 docs: $(VENV)/.tools
 	$(BIN)/python -m scripts.write_docs

@@ -53,7 +53,6 @@ setup(
     extras_require={
         'test': ['beartype', 'mypy', 'onnx', 'pytest', 'ruff'],
         'train': ['onnx', 'torch==2.13.0'],
-        'viz': ['matplotlib'],
         'ray': ['ray'],
     },
     entry_points={
