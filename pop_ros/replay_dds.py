@@ -49,7 +49,7 @@ class NodeProcess:
         """Start it; it inherits the environment, so both sides share domain and RMW."""
         command = [
             sys.executable, '-m', 'pop_ros.node', *sources.as_flags(),
-            '--ros-args', '-p', f'sync.slop_s:={float(slop_s)}']
+            '--ros-args', '-p', f'sync.slop_s:={slop_s:.9f}']
         self._process = subprocess.Popen(command)
 
     def check(self) -> None:
