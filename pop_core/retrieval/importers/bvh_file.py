@@ -5,11 +5,11 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial.transform import Rotation
 
 from pop_core.errors import LibraryFileError
 
@@ -133,7 +133,18 @@ def _rotations(
         ]
         column += len(joint.channels)
         if turns:
-            order = ''.join(axis for axis, _ in turns)
-            angles = numbers[:, [place for _, place in turns]]
-            out[:, j] = Rotation.from_euler(order, angles, degrees=True).as_matrix()
+            factors = [_axis_turn(axis, np.deg2rad(numbers[:, place])) for axis, place in turns]
+            out[:, j] = reduce(np.matmul, factors)
+    return out
+
+
+def _axis_turn(axis: str, angle: Float[np.ndarray, 'n']) -> Float[np.ndarray, 'n 3 3']:
+    """Return rotations about a coordinate axis [rad]."""
+    k = 'XYZ'.index(axis)
+    a, b = (k + 1) % 3, (k + 2) % 3
+    out = np.zeros((len(angle), 3, 3))
+    out[:, k, k] = 1.0
+    out[:, a, a] = out[:, b, b] = np.cos(angle)
+    out[:, b, a] = np.sin(angle)
+    out[:, a, b] = -out[:, b, a]
     return out
