@@ -51,7 +51,7 @@ class FittingConfig:
         700, minimum=50, maximum=20000,
         about='Most measured points that pull on the body in one step.')
     polish_steps: int = setting(
-        3, minimum=0, maximum=20,
+        1, minimum=0, maximum=20,
         about='Steps of the winner on the full mesh.')
     prior_weight: float = setting(
         0.15, minimum=0.0, maximum=100.0,
@@ -142,7 +142,7 @@ class BodyFitter:
         strong, weak = self._weights(4.0), self._weights(1.0)
         placement = self._active(pose=False, betas=False)
         pose = self._active(pose=True, betas=False)
-        for active, weights, steps in ((placement, strong, 2), (pose, strong, 3), (pose, weak, 4)):
+        for active, weights, steps in ((placement, strong, 1), (pose, strong, 2), (pose, weak, 3)):
             for _ in range(steps):
                 self._step(hypothesis, observation, weights, active, None)
 
@@ -306,7 +306,7 @@ class BodyFitter:
 
 # The robust kernel shrinks as the body settles [m].
 EARLY_SCALES_M = (0.15, 0.13, 0.11, 0.09)
-LATE_SCALES_M = (0.08, 0.07, 0.06, 0.05, 0.045, 0.04, 0.035, 0.03)
+LATE_SCALES_M = (0.08, 0.06, 0.045, 0.035, 0.03)
 # Weight of E_depth [per metre of mean pixel error] beside the other terms' costs.
 DEPTH_SCORE = 1000.0
 
