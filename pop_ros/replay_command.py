@@ -33,6 +33,9 @@ def replay(
     every_frame: Annotated[bool, typer.Option(
         '--every-frame', help='Fit every frame, without a node and without dropping.')] = False,
     node_running: NodeRunning = False,
+    pictures: Annotated[Path | None, typer.Option(
+        '--pictures', help='Folder for a page with 3D views, and a film, as pop show draws them.',
+    )] = None,
 ) -> None:
     """Fit the people of a recorded bag and write mesh, joints and points into a new bag."""
     from pop_core.errors import PopError
@@ -52,3 +55,7 @@ def replay(
     typer.echo(f'results: {out}{f" and {ros1}" if ros1 else ""}')
     if not summary.frames:
         raise typer.Exit(1)
+    if pictures is not None:
+        from pop_ros.show_command import draw_replay
+
+        draw_replay(request, pictures, summary.text().splitlines())

@@ -1,0 +1,62 @@
+"""`pop show`: a recording and its bodies as a page and a film."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from pop_core.body.model import BodyModel
+    from pop_ros.replay_session import ReplayRequest
+    from pop_ros.show_recording import ShowRequest
+
+
+def show(
+    recording: Annotated[Path, typer.Argument(help='Bag of the camera.')],
+    bodies: Annotated[Path, typer.Argument(help='Bag that pop replay made of it.')],
+    *,
+    out: Annotated[Path, typer.Option('--out', help='Folder for report.html and the film.')],
+    film: Annotated[str, typer.Option(
+        '--film', help='Name of the film: .mp4, .webp or .gif.')] = 'film.mp4',
+    body: Annotated[Path | None, typer.Option(
+        '--body', help='Body model that was fitted, if not the default one.')] = None,
+    color: Annotated[str | None, typer.Option('--color', help='Colour topic.')] = None,
+    depth: Annotated[str | None, typer.Option('--depth', help='Registered depth topic.')] = None,
+    info: Annotated[str | None, typer.Option('--info', help='CameraInfo of colour.')] = None,
+    slop: Annotated[float, typer.Option(
+        '--slop', min=0.0, max=10.0, help='Largest difference of stamps of a pair [s].')] = 0.5,
+) -> None:
+    """Draw recorded bodies over their recording: a page with 3D views, and a film."""
+    from pop_core.body.default_body import default_body
+    from pop_core.body.model_file import load_body_model
+    from pop_ros.show_recording import ShowRequest
+
+    model = default_body() if body is None else load_body_model(body)
+    _draw(model, ShowRequest(
+        recording=recording, bodies=bodies, out=out, topics=(color, depth, info), slop_s=slop,
+        film=film))
+
+
+def draw_replay(replayed: ReplayRequest, out: Path, notes: Sequence[str]) -> None:
+    """Draw what a replay has just recorded, with what it said."""
+    from pop_core.body.default_body import default_body
+    from pop_ros.show_recording import ShowRequest
+
+    _draw(default_body(), ShowRequest(
+        recording=replayed.bag, bodies=replayed.out, out=out, topics=replayed.topics,
+        slop_s=replayed.slop_s, notes=notes))
+
+
+def _draw(model: BodyModel, request: ShowRequest) -> None:
+    from pop_ros.progress import terminal_progress
+    from pop_ros.show_recording import show_recording
+
+    with terminal_progress() as display:
+        task = display.add_task('Drawing', total=None)
+        written = show_recording(
+            request, model, lambda frames: display.update(task, completed=frames))
+    for path in written:
+        typer.echo(f'{path}')

@@ -1,0 +1,190 @@
+"""Draw a recording and the bodies found in it: a film and a page with pictures and 3D views."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pop_core import __version__
+from pop_core.body.model import BodyModel
+from pop_core.errors import PopError
+from pop_core.estimate import JointState
+from pop_core.rendering.pictures import four_panels
+from pop_core.rendering.shown_body import ShownBody
+from pop_core.rendering.summary_film import SummaryFilm
+from pop_core.rgbd import RgbdFrame
+from pop_ros.bag_reader import BagMessage, BagReader
+from pop_ros.bag_topics import RgbdTopics, find_topics
+from pop_ros.from_messages import frame_from_messages
+from pop_ros.pairing import FramePairer
+from pop_ros.recorded_bodies import RecordedFrame, read_bodies, shown_bodies
+from pop_ros.replay import paired_frames
+from pop_ros.report import Report
+from pop_ros.report3d import SceneFrame
+
+MAX_PICTURES = 24  # of a page: 0.1 MB each
+MAX_SCENES = 6  # of a page: 0.7 MB each
+FILM_HZ = 4.0  # slow enough to look at four panels
+LEGEND = (
+    'Left to right, top to bottom: colour, depth, the fitted mesh with its skeleton (hollow '
+    'joints are hidden from the camera; the outline is what was segmented), and the scene from '
+    'the right and from above with the measured points of the people in black.')
+HOW_TO_TURN = (
+    'Drag to turn, wheel to come nearer. White joints are seen by the camera, dark ones are '
+    'hidden from it.')
+
+
+class ShowError(PopError):
+    """Bodies that cannot be drawn over a recording."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShowRequest:
+    """What to draw.
+
+    Args:
+        recording: Bag of the camera.
+        bodies: Bag that `pop replay` made of it.
+        out: Folder for `report.html` and the film.
+        topics: Colour, depth and CameraInfo topics where the user named them.
+        slop_s: Largest difference of stamps of a pair [s].
+        film: Name of the film; its suffix is the format.
+        notes: What else the page should say, line by line.
+    """
+
+    recording: Path
+    bodies: Path
+    out: Path
+    topics: tuple[str | None, str | None, str | None] = (None, None, None)
+    slop_s: float = 0.5
+    film: str = 'film.mp4'
+    notes: Sequence[str] = ()
+
+
+def show_recording(
+    request: ShowRequest, model: BodyModel, on_frame: Callable[[int], None] = lambda _n: None
+) -> tuple[Path, Path]:
+    """Write the film and the page of a recording; return where they are.
+
+    Args:
+        request: What to draw.
+        model: Body whose meshes were recorded.
+        on_frame: Told how many frames are drawn.
+
+    Raises:
+        PopError: If a bag cannot be read, or no body of it belongs to the recording.
+    """
+    request.out.mkdir(parents=True, exist_ok=True)
+    film_path, page = request.out / request.film, request.out / 'report.html'
+    kept: list[tuple[SceneFrame, np.ndarray]] = []
+    counts = _Counts()
+    step = 1
+    with SummaryFilm(film_path, FILM_HZ) as film:
+        for scene in _scenes(request, model):
+            picture = four_panels(scene.frame, scene.bodies, model.f)
+            film.add(picture)
+            if counts.frames % step == 0:
+                kept.append((scene, picture))
+            if len(kept) > 2 * MAX_PICTURES:
+                kept, step = kept[::2], 2 * step
+            counts.add(scene.bodies)
+            on_frame(counts.frames)
+    if not counts.frames:
+        raise ShowError(
+            f'{request.recording}: expected the recording that {request.bodies} was made of, '
+            'found no frame with these stamps')
+    _write_page(page, request, model, _evenly(kept, MAX_PICTURES), counts)
+    return page, film_path
+
+
+@dataclass(slots=True)
+class _Counts:
+    frames: int = 0
+    people: int = 0
+    seen: int = 0
+    hidden: int = 0
+
+    def add(self, bodies: Sequence[ShownBody]) -> None:
+        self.frames += 1
+        self.people += len(bodies)
+        for body in bodies:
+            seen = int((body.joint_state == JointState.VISIBLE).sum())
+            self.seen += seen
+            self.hidden += len(body.joint_state) - seen
+
+
+def _scenes(request: ShowRequest, model: BodyModel) -> Iterator[SceneFrame]:
+    """Yield the frames from the first to the last with bodies, those without any among them."""
+    recorded = read_bodies(request.bodies)
+    if not recorded:
+        raise ShowError(f'{request.bodies}: expected recorded bodies, found none')
+    first_ns, last_ns = min(recorded), max(recorded)
+    with BagReader(request.recording) as bag:
+        topics = find_topics(bag, *request.topics)
+        for frame in _frames(bag, topics, request.slop_s):
+            if first_ns <= frame.stamp_ns <= last_ns:
+                bodies = _bodies(recorded.get(frame.stamp_ns), frame, model, request)
+                yield SceneFrame(frame, bodies, _caption(frame, bodies, first_ns))
+
+
+def _frames(bag: BagReader, topics: RgbdTopics, slop_s: float) -> Iterator[RgbdFrame]:
+    pairer: FramePairer[BagMessage] = FramePairer(round(slop_s * 1e9))
+    for frame in paired_frames(bag, topics, pairer, lambda: None):
+        try:
+            yield frame_from_messages(frame.color.read(), frame.depth.read(), frame.info.read())
+        except PopError:
+            continue  # whoever made the bodies has dropped it and said so
+
+
+def _bodies(
+    recorded: RecordedFrame | None, frame: RgbdFrame, model: BodyModel, request: ShowRequest
+) -> list[ShownBody]:
+    if recorded is None:
+        return []
+    for corners in recorded.triangles:
+        if len(corners) != model.f.size:
+            raise ShowError(
+                f'{request.bodies}: expected meshes of {len(model.f)} triangles, found '
+                f'{len(corners) // 3}: name the body they were made with (--body), and record '
+                'with mesh.detail full')
+    return shown_bodies(recorded, frame, model)
+
+
+def _caption(frame: RgbdFrame, bodies: Sequence[ShownBody], first_ns: int) -> str:
+    count = len(bodies)
+    people = 'nobody' if not count else f'{count} {"person" if count == 1 else "people"}'
+    return f'{(frame.stamp_ns - first_ns) / 1e9:.2f} s: {people}'
+
+
+def _write_page(
+    page: Path,
+    request: ShowRequest,
+    model: BodyModel,
+    kept: Sequence[tuple[SceneFrame, np.ndarray]],
+    counts: _Counts,
+) -> None:
+    report = Report(
+        f'pop: {request.recording.name}',
+        f'{counts.people} bodies in {counts.frames} frames; the camera sees {counts.seen} of '
+        f'their {counts.seen + counts.hidden} joints, the others were inferred.')
+    report.scenes([scene for scene, _ in _evenly(kept, MAX_SCENES)], model.f)
+    report.text(HOW_TO_TURN)
+    report.heading('Frame by frame')
+    report.film([picture for _, picture in kept], [scene.caption for scene, _ in kept])
+    report.text(LEGEND)
+    if request.notes:
+        report.heading('What the replay said')
+        report.commands(request.notes)
+    report.text(f'Written by pop {__version__} from {request.bodies.name}.')
+    report.write(page)
+
+
+def _evenly(
+    items: Sequence[tuple[SceneFrame, np.ndarray]], count: int
+) -> list[tuple[SceneFrame, np.ndarray]]:
+    """Return at most `count` items, the first and the last among them."""
+    chosen = np.unique(np.linspace(0, len(items) - 1, min(count, len(items))).astype(int))
+    return [items[i] for i in chosen]
