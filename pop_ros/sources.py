@@ -67,11 +67,14 @@ def make_pipeline(
     from pop_core.pipeline import BodyPipeline
     from pop_core.retrieval.default_library import default_library
     from pop_core.retrieval.library_file import load_library
+    from pop_core.retrieval.pose_library import on_body
     from pop_ros.warm_up import warm_up
 
     model = default_body() if body_file is None else load_body_model(body_file)
     told = None if progress is None else _as_counter(progress)
     library = default_library(told) if library_file is None else load_library(library_file)
+    if body_file is not None:
+        library = on_body(library, model)
     pipeline = BodyPipeline(model, library, detector, config)
     warm_up(pipeline)
     return pipeline

@@ -17,6 +17,7 @@ from pop_core.errors import LibraryFileError
 from pop_core.retrieval.library_kernels import upright_joints
 
 ALL_VISIBLE = (1 << N_SHARED) - 1
+CHUNK = 100_000  # poses whose rotations are held in double precision at a time
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,6 +90,21 @@ def build_library(
         masks=np.full(m, ALL_VISIBLE, dtype=np.uint16) if masks is None else masks,
         weights=np.ones(m, dtype=np.float32),
     )
+
+
+def on_body(library: PoseLibrary, model: BodyModel) -> PoseLibrary:
+    """Return the library with its joints on another body: poses are anybody's, joints are not.
+
+    Hips and shoulders of body models lie centimetres apart, as much as neighbouring poses.
+    """
+    columns = np.empty(library.columns.shape, dtype=np.float32)
+    for start in range(0, len(library), CHUNK):
+        part = slice(start, start + CHUNK)
+        columns[:, :, part] = pose_columns(
+            np.asarray(library.body_pose[part], dtype=np.float64),
+            np.asarray(library.tilt[part], dtype=np.float64), model)
+    return PoseLibrary(
+        library.body_pose, library.tilt, columns, library.masks, library.weights)
 
 
 def pose_columns(

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,12 @@ from pop_core.retrieval.library_file import (
     save_library,
 )
 from pop_core.retrieval.library_merge import merge_libraries
-from pop_core.retrieval.pose_library import PoseLibrary, build_library, pose_columns
+from pop_core.retrieval.pose_library import (
+    PoseLibrary,
+    build_library,
+    on_body,
+    pose_columns,
+)
 
 
 def small_library(n: int = 37, seed: int = 0) -> PoseLibrary:
@@ -46,6 +52,13 @@ def test_joints_are_those_of_the_poses(saved):
     columns = pose_columns(
         library.body_pose.astype(float), library.tilt.astype(float), default_body())
     assert np.allclose(library.columns, columns, atol=1e-6)
+
+
+def test_another_body_has_joints_of_its_own(saved):
+    library, model = load_library(saved), default_body()
+    assert np.allclose(on_body(library, model).columns, library.columns, atol=1e-6)
+    child = replace(model, v_template=0.6 * model.v_template, shapedirs=0.6 * model.shapedirs)
+    assert np.allclose(on_body(library, child).columns, 0.6 * library.columns, atol=1e-5)
 
 
 @pytest.mark.parametrize('kept', [3, 16, 500, 5000])
