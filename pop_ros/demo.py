@@ -22,6 +22,7 @@ from pop_ros.node_arguments import SourceArguments
 from pop_ros.recorded_bodies import RecordedFrame, read_bodies, shown_bodies
 from pop_ros.replay import ReplaySummary
 from pop_ros.replay_session import ReplayRequest, run_replay
+from pop_ros.report3d import SceneFrame
 from pop_ros.result_folder import write_png
 
 RATE_HZ = 10.0
@@ -74,11 +75,13 @@ class DemoFrame:
         picture: Its four panels.
         errors_m: Distance of each joint from the truth [m].
         hidden: Joints that the camera does not see, by the truth.
+        scene: The frame and its people, to be shown in 3D.
     """
 
     picture: np.ndarray
     errors_m: np.ndarray
     hidden: np.ndarray
+    scene: SceneFrame | None = None
 
 
 def prepare_folder(root: Path) -> DemoPaths:
@@ -149,10 +152,12 @@ def draw_frames(
 def _draw_frame(
     scene: SyntheticScene, published: RecordedFrame, model: BodyModel
 ) -> DemoFrame:
-    picture = four_panels(
-        scene.frame, shown_bodies(published, scene.frame, model), model.f)
+    bodies = shown_bodies(published, scene.frame, model)
+    picture = four_panels(scene.frame, bodies, model.f)
     truth = scene.people[0]
     to_pelvis = np.linalg.norm(published.joints[:, PELVIS] - truth.joints[PELVIS], axis=1)
     nearest = published.joints[int(to_pelvis.argmin())]
     errors_m = np.linalg.norm(nearest - truth.joints, axis=1)
-    return DemoFrame(picture, errors_m, truth.joint_state != JointState.VISIBLE)
+    return DemoFrame(
+        picture, errors_m, truth.joint_state != JointState.VISIBLE,
+        SceneFrame(scene.frame, bodies, f'stamp {scene.frame.stamp_ns / 1e9:.1f} s'))

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from pop_core import __version__
+from pop_core.body.default_body import default_body
 from pop_ros.demo import DemoFrame, DemoPaths
 from pop_ros.replay import ReplaySummary
 from pop_ros.report import Report
+from pop_ros.show_recording import HOW_TO_TURN, LEGEND, MAX_SCENES
 
 LEAD = (
     'A synthetic person walks behind a table. A ROS 2 node in its own process received the '
     'recording over DDS and published a mesh, joints and points for every frame it had time '
     'for; what you see was read back from the bag of its outputs.')
-LEGEND = (
-    'Left to right, top to bottom: colour, depth, the fitted mesh with its skeleton (hollow '
-    'joints are hidden from the camera; the outline is what was segmented), and the scene from '
-    'the right and from above with the measured points of the person in black.')
 
 
 def write_demo_report(
@@ -28,6 +27,11 @@ def write_demo_report(
     report = Report('pop: a body, hidden limbs included', LEAD)
     report.film([frame.picture for frame in frames], [_caption(frame) for frame in frames])
     report.text(LEGEND)
+    scenes = [frame.scene for frame in frames if frame.scene is not None]
+    if scenes:
+        report.heading('Walk around it')
+        report.scenes(scenes[::math.ceil(len(scenes) / MAX_SCENES)], default_body().f)
+        report.text(HOW_TO_TURN)
     report.heading('Distance of joints from the truth')
     report.table(('joints', 'count', 'mean', 'median', '90 %'), error_rows(frames))
     report.text(

@@ -78,7 +78,7 @@ def page(tmp_path):
 def test_a_report_needs_no_other_file(page):
     sources = re.findall(r'(?:src|href)\s*=\s*["\']([^"\']+)', page)
     assert all(source.startswith('data:') for source in sources)
-    assert 'http' not in page
+    assert '://' not in page
 
 
 def test_a_report_shows_text_as_text(page):
