@@ -34,7 +34,7 @@ def measure_recall(mocap: Path, frames: int) -> list[dict[str, object]]:
         'ours, K = 6': RetrievalConfig(candidates=6),
         'ours, K = 1': RetrievalConfig(candidates=1),
         "the paper's rule: same visibility, K = 1": RetrievalConfig(
-            candidates=1, same_visibility=True),
+            candidates=1, shortlist=1, same_visibility=True),
     }
     down = np.array([0.0, 1.0, 0.0])
     rows: list[dict[str, object]] = []
