@@ -30,8 +30,10 @@ from pop_ros.node_arguments import SourceArguments
 from pop_ros.node_config import NodeConfig
 from pop_ros.parameters import ConfigParameters
 from pop_ros.pop_messages import model_message, pop_msgs
-from pop_ros.qos import output_qos
+from pop_ros.qos import output_qos, static_tf_qos
+from pop_ros.static_frames import StaticFrames
 from pop_ros.statistics import NodeStatistics, Snapshot, drop_reason
+from pop_ros.tf_messages import tf2_msgs
 from pop_ros.to_messages import make_header
 from pop_ros.worker import Worker
 
@@ -65,6 +67,10 @@ class PopNode(Node):
         self._trouble = ''
         self._said_share = 0.0
         self._fitter: FrameFitter | None = None
+        self._frames = StaticFrames()
+        if tf2_msgs is not None:
+            self.create_subscription(
+                tf2_msgs.TFMessage, '/tf_static', self._frames.add_message, static_tf_qos())
         self._inputs = RgbdInputs(self, self._config.sync.slop_s, self._on_frame)
         self._outputs = {
             name: self.create_publisher(
@@ -166,7 +172,7 @@ class PopNode(Node):
             'pose library and compiles kernels, later ones read them from the cache')
         fitter = FrameFitter(
             self._arguments, self._settings.pipeline_config, self._config,
-            self._say_progress)
+            self._say_progress, self._frames)
         self._fitter = fitter
         self._publish_model(fitter.model)
         self.log.info(f'ready after {time.monotonic() - started_s:.1f} s')
@@ -195,7 +201,8 @@ class PopNode(Node):
             self._restart.clear()
             self._fitter.reset()
         fitted = self._fitter.fit(
-            messages.color, messages.depth, messages.info, self._wanted())
+            messages.color, messages.depth, messages.info, messages.depth_info,
+            wanted=self._wanted())
         for name, message in fitted.outputs:
             self._outputs[name].publish(message)
         latency_ms = (time.monotonic() - messages.arrival_s) * 1e3

@@ -11,10 +11,11 @@ from pop_core.config import PipelineConfig
 from pop_core.estimate import FrameResult
 from pop_core.pipeline import BodyPipeline
 from pop_ros.body_messages import RECORDED_TYPES, BodyMessages, Output
-from pop_ros.from_messages import frame_from_messages
+from pop_ros.frame_maker import FrameMaker
 from pop_ros.node_arguments import SourceArguments
 from pop_ros.node_config import NodeConfig
 from pop_ros.sources import make_detector, make_pipeline
+from pop_ros.static_frames import StaticFrames, parse_extrinsics
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,10 +40,12 @@ class FrameFitter:
         pipeline_config: PipelineConfig,
         config: NodeConfig,
         progress: Callable[[float, str], None] | None = None,
+        frames: StaticFrames | None = None,
     ) -> None:
         """Load the keypoint source, body model and pose library.
 
-        `progress` is told a share 0..1 and a sentence while a first library is generated.
+        `progress` is told a share 0..1 and a sentence while a first library is generated;
+        `frames` knows where a depth camera with a frame of its own stands.
 
         Raises:
             PopError: If one of them cannot be loaded.
@@ -51,6 +54,8 @@ class FrameFitter:
             arguments.keypoints, arguments.keypoints_dir, arguments.decoder)
         self._pipeline = make_pipeline(detector, pipeline_config, progress=progress)
         self._messages = BodyMessages(self._pipeline.model, config)
+        self._maker = FrameMaker(frames or StaticFrames())
+        self._maker.extrinsics = parse_extrinsics(config.depth.extrinsics)
 
     @property
     def model(self) -> BodyModel:
@@ -63,14 +68,15 @@ class FrameFitter:
         self._pipeline = BodyPipeline(
             old.model, old.library, old.detector, pipeline_config, old.fitter.prior)
         self._messages.configure(config)
+        self._maker.extrinsics = parse_extrinsics(config.depth.extrinsics)
 
     def reset(self) -> None:
         """Start the ids of people anew."""
         self._messages.reset()
 
     def fit(
-        self, color: Any, depth: Any, info: Any,
-        wanted: Collection[str] = tuple(RECORDED_TYPES),
+        self, color: Any, depth: Any, info: Any, depth_info: Any = None,
+        *, wanted: Collection[str] = tuple(RECORDED_TYPES),
     ) -> FittedFrame:
         """Return result and messages of a pair of images and their CameraInfo.
 
@@ -78,7 +84,7 @@ class FrameFitter:
             BadMessageError: If the messages make no frame.
             PopError: If the keypoint source cannot read what it needs for this frame.
         """
-        frame = frame_from_messages(color, depth, info)
+        frame = self._maker.make(color, depth, info, depth_info)
         result = self._pipeline.process(frame)
         outputs = self._messages.build(result, frame, color.header.frame_id, wanted)
         return FittedFrame(result, outputs)

@@ -19,12 +19,15 @@ from pop_ros.pairing import FramePairer, Pair
 from pop_ros.qos import describe_qos, matched_qos, same_qos
 
 COLOR, DEPTH, INFO = 'color/image', 'depth/image', 'color/camera_info'
+DEPTH_INFO = 'depth/camera_info'  # only for depth in a frame of its own
 # Where a role's messages come from, best first; suffixes are those of image_transport.
 TRANSPORTS: Mapping[str, Sequence[tuple[str, type]]] = {
     COLOR: (('', Image), ('/compressed', CompressedImage)),
     DEPTH: (('', Image), ('/compressedDepth', CompressedImage)),
     INFO: (('', CameraInfo),),
+    DEPTH_INFO: (('', CameraInfo),),
 }
+LATCHED = (INFO, DEPTH_INFO)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,12 +39,14 @@ class RgbdMessages:
         depth: sensor_msgs/Image or CompressedImage of depth.
         info: sensor_msgs/CameraInfo of the colour camera.
         arrival_s: Steady time at which the pair was complete [s].
+        depth_info: sensor_msgs/CameraInfo of the depth camera, or None.
     """
 
     color: Any
     depth: Any
     info: CameraInfo
     arrival_s: float
+    depth_info: CameraInfo | None = None
 
 
 class InputTopic:
@@ -63,7 +68,7 @@ class InputTopic:
         if not offers:
             return
         profile = matched_qos(
-            [o.qos_profile for o in offers], latched=self.role == INFO, reliability=reliability)
+            [o.qos_profile for o in offers], latched=self.role in LATCHED, reliability=reliability)
         if self._subscribed is not None:
             before, present = self._subscribed
             if before == topic and same_qos(profile, present):
@@ -124,12 +129,14 @@ class RgbdInputs:
         self.pairer: FramePairer[Any] = FramePairer(round(slop_s * 1e9))
         self._on_frame = on_frame
         self._info: CameraInfo | None = None
+        self._depth_info: CameraInfo | None = None
         self._without_info: Pair[Any] | None = None
         self.last_frame_s = time.monotonic()
         self.topics = (
             InputTopic(node, COLOR, self._on_color),
             InputTopic(node, DEPTH, self._on_depth),
             InputTopic(node, INFO, self._on_info),
+            InputTopic(node, DEPTH_INFO, self._on_depth_info),
         )
 
     def follow(self, reliability: str) -> None:
@@ -141,7 +148,7 @@ class RgbdInputs:
         """Unsubscribe everything; what comes next may be another camera."""
         for topic in self.topics:
             topic.leave()
-        self._info = None
+        self._info = self._depth_info = None
         self.reset(self.pairer.slop_ns / 1e9)
 
     def reset(self, slop_s: float) -> None:
@@ -155,8 +162,9 @@ class RgbdInputs:
         self._hand_on(self.pairer.poll(time.monotonic_ns()))
 
     def reports(self) -> list[TopicReport]:
-        """Return the state of the three topics."""
-        return [topic.report() for topic in self.topics]
+        """Return the state of the topics; that of the optional one only where it is published."""
+        reports = [topic.report() for topic in self.topics]
+        return [report for report in reports if report.role != DEPTH_INFO or report.offers]
 
     def _on_color(self, message: Any) -> None:
         now_ns = time.monotonic_ns()
@@ -172,10 +180,14 @@ class RgbdInputs:
             pair, self._without_info = self._without_info, None
             self._hand_on([pair])
 
+    def _on_depth_info(self, message: CameraInfo) -> None:
+        self._depth_info = message
+
     def _hand_on(self, pairs: list[Pair[Any]]) -> None:
         for pair in pairs:
             if self._info is None:
                 self._without_info = pair
                 continue
             self.last_frame_s = time.monotonic()
-            self._on_frame(RgbdMessages(pair.color, pair.depth, self._info, self.last_frame_s))
+            self._on_frame(RgbdMessages(
+                pair.color, pair.depth, self._info, self.last_frame_s, self._depth_info))

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from pop_core.errors import SettingError
 from pop_core.settings import setting
+from pop_ros.static_frames import parse_extrinsics
 
 RELIABILITIES = ('auto', 'reliable', 'best_effort')
 MESH_DETAILS = ('full', 'reduced', 'off')
@@ -27,6 +28,14 @@ class InputConfig:
 
     reliability: str = setting(
         'auto', about='Reliability asked of publishers: auto (as offered), reliable, best_effort.')
+
+
+@dataclass(frozen=True, slots=True)
+class DepthConfig:
+    """How depth in a frame of its own is brought to colour."""
+
+    extrinsics: str = setting(
+        '', about='Depth camera in the color frame, "x y z qx qy qz qw" [m]; empty asks TF.')
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +63,7 @@ class NodeConfig:
 
     sync: SyncConfig = field(default_factory=SyncConfig)
     input: InputConfig = field(default_factory=InputConfig)
+    depth: DepthConfig = field(default_factory=DepthConfig)
     mesh: MeshConfig = field(default_factory=MeshConfig)
     tf: TfConfig = field(default_factory=TfConfig)
     lazy: bool = setting(
@@ -63,6 +73,7 @@ class NodeConfig:
     def __post_init__(self) -> None:
         _check_choice('input.reliability', self.input.reliability, RELIABILITIES)
         _check_choice('mesh.detail', self.mesh.detail, MESH_DETAILS)
+        parse_extrinsics(self.depth.extrinsics)
         _check_choice('tf.frames', self.tf.frames, TF_FRAMES)
 
 

@@ -9,6 +9,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 # Of the images that wait in the middleware only a few matter: old ones are never fitted.
 INPUT_DEPTH = 5
 OUTPUT_DEPTH = 5
+STATIC_TF_DEPTH = 100  # one per publisher, and every publisher counts
 
 
 def matched_qos(
@@ -43,6 +44,13 @@ def output_qos(*, latched: bool = False) -> QoSProfile:
     return QoSProfile(  # type: ignore[no-untyped-call]
         history=HistoryPolicy.KEEP_LAST, depth=1 if latched else OUTPUT_DEPTH,
         reliability=ReliabilityPolicy.RELIABLE, durability=durability)
+
+
+def static_tf_qos() -> QoSProfile:
+    """Return the profile of /tf_static: the last messages of all its publishers."""
+    return QoSProfile(  # type: ignore[no-untyped-call]
+        history=HistoryPolicy.KEEP_LAST, depth=STATIC_TF_DEPTH,
+        reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def describe_qos(profile: QoSProfile) -> str:

@@ -4,6 +4,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator
 
+import numpy as np
 import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -12,9 +13,12 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from support.camera import START_NS, STEP_NS, CameraPlan, start_camera
 
 from pop_ros.explanation import explain_missing_pairs
+from pop_ros.frame_maker import FrameMaker
 from pop_ros.from_messages import frame_from_messages, stamp_ns
 from pop_ros.inputs import RgbdInputs, RgbdMessages
+from pop_ros.message_error import BadMessageError
 from pop_ros.qos import describe_qos, matched_qos, same_qos
+from pop_ros.static_frames import StaticFrames
 
 RELIABLE, BEST_EFFORT = ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT
 
@@ -89,6 +93,19 @@ def test_compressed_images_are_found_where_no_others_are_published(receiver: Rec
     frame = frame_from_messages(last.color, last.depth, last.info)
     assert frame.depth_m[5, 5] == 2.0
     assert frame.rgb[5, 5].tolist() == [5, 5, 5]
+
+
+def test_the_depth_camera_s_info_comes_with_depth_in_a_frame_of_its_own(
+    receiver: Receiver
+) -> None:
+    receive(receiver, CameraPlan(frames=4, depth_frame='depth'), 4)
+    last = receiver.frames[-1]
+    maker = FrameMaker(StaticFrames())
+    maker.extrinsics = np.eye(4)
+    frame = maker.make(last.color, last.depth, last.info, last.depth_info)
+    assert frame.depth_m[20, 20] == pytest.approx(2.0)
+    with pytest.raises(BadMessageError, match='no transform between them'):
+        FrameMaker(StaticFrames()).make(last.color, last.depth, last.info, last.depth_info)
 
 
 def test_a_recording_that_loops_gives_every_pair_every_time(receiver: Receiver) -> None:

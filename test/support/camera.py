@@ -30,6 +30,7 @@ class CameraPlan:
         depth_lag_ns: Depth stamp minus colour stamp [ns].
         depth_encoding: Encoding of depth.
         break_frame: Index of a frame whose colour image is malformed, -1 for none.
+        depth_frame: Frame of depth; another than 'camera' comes with depth/camera_info.
         compressed: Whether only compressed images are published.
         listeners: Subscribers on each topic to wait for before the first frame.
     """
@@ -42,6 +43,7 @@ class CameraPlan:
     depth_lag_ns: int = 0
     depth_encoding: str = '16UC1'
     break_frame: int = -1
+    depth_frame: str = 'camera'
     compressed: bool = False
     listeners: int = 1
 
@@ -74,6 +76,9 @@ def main(plan_json: str) -> None:
         depth = node.create_publisher(Image, 'depth/image', images)
     info = node.create_publisher(
         CameraInfo, 'color/camera_info', latched if plan.info == 'latched' else 10)
+    if plan.depth_frame != 'camera':
+        depth_info = node.create_publisher(CameraInfo, 'depth/camera_info', latched)
+        depth_info.publish(camera_info(START_NS))
     if plan.info == 'latched':
         info.publish(camera_info(START_NS))
     deadline = time.monotonic() + 30
@@ -84,17 +89,7 @@ def main(plan_json: str) -> None:
     time.sleep(0.4)  # both sides must have matched, and what is latched have arrived
     for _ in range(plan.plays):
         for k in range(plan.frames):
-            stamp = START_NS + k * STEP_NS
-            if plan.info == 'every':
-                info.publish(camera_info(stamp))
-            message = color_image(stamp, k)
-            if k == plan.break_frame:
-                message.step = 1
-            far = depth_image(stamp + plan.depth_lag_ns, plan.depth_encoding)
-            color.publish(as_png(message, 'rgb8; png compressed bgr8', b'')
-                          if plan.compressed else message)
-            depth.publish(as_png(far, '16UC1; compressedDepth png', bytes(12))
-                          if plan.compressed else far)
+            publish_frame(plan, k, color, depth, info)
             time.sleep(1 / plan.rate_hz)
     if plan.info == 'late':
         time.sleep(0.3)
@@ -102,6 +97,22 @@ def main(plan_json: str) -> None:
     time.sleep(0.6)  # the middleware must have sent everything
     node.destroy_node()
     rclpy.shutdown()
+
+
+def publish_frame(plan: CameraPlan, k: int, color: Any, depth: Any, info: Any) -> None:
+    """Publish frame `k` on the three publishers."""
+    stamp = START_NS + k * STEP_NS
+    if plan.info == 'every':
+        info.publish(camera_info(stamp))
+    message = color_image(stamp, k)
+    if k == plan.break_frame:
+        message.step = 1
+    far = depth_image(stamp + plan.depth_lag_ns, plan.depth_encoding)
+    far.header.frame_id = plan.depth_frame
+    color.publish(as_png(message, 'rgb8; png compressed bgr8', b'')
+                  if plan.compressed else message)
+    depth.publish(as_png(far, '16UC1; compressedDepth png', bytes(12))
+                  if plan.compressed else far)
 
 
 def header(stamp_ns: int) -> Any:
