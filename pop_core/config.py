@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from pop_core.fitting.body_fit import FittingConfig
+from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.keypoints.lifting import LiftingConfig
 from pop_core.retrieval.retrieve import RetrievalConfig
 from pop_core.segmentation.body_segmentation import SegmentationConfig

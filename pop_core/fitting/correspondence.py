@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
+from pop_core.body.joints import N_JOINTS, PARENTS
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.depth_consistency import Sight, Visibility
 from pop_core.fitting.observation import Observation, sensor_sigma_m
@@ -15,6 +16,18 @@ from pop_core.fitting.robust_loss import geman_mcclure_weight
 SKIN_SIGMA_M = 0.010  # clothes, hair and the coarse mesh: never trust a point more than this
 EFFECTIVE_POINTS = 1000.0  # neighbouring pixels err together; so many are worth independent ones
 VERTEX_SHARE = 0.3  # weight of vertex-to-point pairs beside point-to-vertex pairs
+
+
+def _near_parts() -> Bool[np.ndarray, '24 24']:
+    """Return which parts are at most two bones apart: borders between parts are vague."""
+    linked = np.eye(N_JOINTS, dtype=bool)
+    for child, parent in enumerate(PARENTS):
+        if parent >= 0:
+            linked[child, parent] = linked[parent, child] = True
+    return np.asarray(linked @ linked)
+
+
+NEAR_PARTS = _near_parts()
 
 
 def thin_points(
@@ -35,6 +48,7 @@ def match_points(
     state: BodyState,
     visibility: Visibility,
     points: Float[np.ndarray, 'n 3'],
+    parts: Int[np.ndarray, 'n'],
     scale_m: float,
 ) -> Pairs:
     """Pair every measured point with its nearest vertex that faces the camera (pi_NN of E_NN).
@@ -43,14 +57,18 @@ def match_points(
         state: Body.
         visibility: Which vertices face the camera.
         points: Measured points of H [m].
+        parts: Joint of the body part each point was recognised as, -1 where it was not.
         scale_m: Scale of the robust kernel [m].
     """
     facing = np.flatnonzero(visibility.facing)
     if len(facing) == 0 or len(points) == 0:
         return no_pairs()
     distance, nearest = cKDTree(state.vertices[facing]).query(points)
-    kernel = geman_mcclure_weight(distance, scale_m)
-    return _plane_pairs(state, facing[nearest], points, kernel * EFFECTIVE_POINTS)
+    vertex = facing[nearest]
+    worth = EFFECTIVE_POINTS * geman_mcclure_weight(distance, scale_m)
+    # A point recognised as an arm never pulls on the chest it rests on.
+    fits = (parts < 0) | NEAR_PARTS[parts, state.body.main_bone[vertex]]
+    return _plane_pairs(state, vertex, points, worth * fits)
 
 
 def match_vertices(state: BodyState, visibility: Visibility, scale_m: float) -> Pairs:

@@ -10,7 +10,7 @@ def body() -> BodyModel:
     return default_body()
 
 
-@pytest.fixture
+@pytest.fixture(scope='session')
 def person() -> BodyParameters:
     """A person facing the camera with lowered, slightly bent arms."""
     pose = np.zeros((23, 3))

@@ -8,6 +8,9 @@ from pop_core.body.joints import JOINT_INDEX, SHARED_INDEX
 from pop_core.body.kinematics import attached_positions, joints
 from pop_core.body.model import BodyModel, BodyParameters, shared_points
 from pop_core.fitting.body_fit import BodyFit, BodyFitter
+from pop_core.fitting.body_state import FitBody
+from pop_core.fitting.correspondence import match_points
+from pop_core.fitting.depth_consistency import see_body
 from pop_core.fitting.observation import observe
 from pop_core.fitting.uncertainty import joint_covariance
 from pop_core.geometry.rotation import from_rotvec
@@ -99,3 +102,17 @@ def test_runners_up_are_reported(
     result = fit(fitter, photograph(body, person), lift_truth(body, person), start)
     assert len(result.runners_up) == fitter.config.final_hypotheses - 1
     assert set(result.energies) == {'E_J3D', 'E_prior', 'E_NN', 'E_depth'}
+
+
+def test_points_recognised_as_a_far_part_do_not_pull(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    frame = photograph(body, person)
+    observation = observe(frame, lift_truth(body, person), NOBODY)
+    state = FitBody(body, full=False).state(person)
+    visibility = see_body(state, observation)
+    chest = state.vertices[state.body.main_bone == JOINT_INDEX['spine3']][:20]
+    for part, pulls in (('spine2', True), ('left_hand', False)):
+        parts = np.full(len(chest), JOINT_INDEX[part])
+        pairs = match_points(state, visibility, chest, parts, 0.1)
+        assert (pairs.weight > 0).any() == pulls

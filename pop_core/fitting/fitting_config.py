@@ -1,0 +1,33 @@
+"""Settings of the fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pop_core.settings import setting
+
+
+@dataclass(frozen=True, slots=True)
+class FittingConfig:
+    """How hypotheses are fitted and chosen."""
+
+    surface_hypotheses: int = setting(
+        4, minimum=1, maximum=12,
+        about='Hypotheses that reach the surface fit, best of E_J3D first.')
+    final_hypotheses: int = setting(
+        2, minimum=1, maximum=12,
+        about='Hypotheses that are fitted to the end, best of E_depth first.')
+    surface_points: int = setting(
+        700, minimum=50, maximum=20000,
+        about='Most measured points that pull on the body in one step.')
+    polish_steps: int = setting(
+        1, minimum=0, maximum=20,
+        about='Steps of the winner on the full mesh.')
+    prior_weight: float = setting(
+        0.15, minimum=0.0, maximum=100.0,
+        about='Weight of the learned pose prior.')
+    neighbour_weight: float = setting(
+        0.15, minimum=0.0, maximum=100.0,
+        about='Weight of the conditional prior: stay near the retrieved pose where all agree.')
+    free_space: bool = setting(
+        True, about='Whether bodies are pushed out of space the sensor saw through.')
