@@ -14,6 +14,7 @@ from pop_core.errors import PopError
 if TYPE_CHECKING:
     from pop_core.pipeline import BodyPipeline
     from pop_ros.fit_keypoints import FrameKeypoints
+    from pop_ros.fit_pictures import FitExplainer
     from pop_ros.frame_folder import FrameFolder
 
 BAD_INPUT = 2
@@ -39,6 +40,9 @@ def fit(
     settings: Annotated[list[str] | None, typer.Option(
         '--set', metavar='NAME=VALUE',
         help='Change a setting, as in docs/parameters.md; may be repeated.')] = None,
+    explain: Annotated[bool, typer.Option(
+        '--explain', help='Also draw energies over the steps of each fit and, beside a '
+        'truth.npz, the errors of the surface.')] = False,
 ) -> None:
     """Fit the people of RGB-D frames: mesh, joints, mask and uncertainty of each.
 
@@ -57,6 +61,7 @@ def fit(
     """
     from pop_core.config import PipelineConfig
     from pop_ros.fit_keypoints import FrameKeypoints
+    from pop_ros.fit_pictures import FitExplainer
     from pop_ros.progress import first_use_progress
     from pop_ros.settings_flags import with_flags
     from pop_ros.sources import make_pipeline
@@ -67,7 +72,8 @@ def fit(
     if frames:
         with first_use_progress() as progress:
             pipeline = make_pipeline(source, config, body, library, progress)
-        bad += _fit_all(frames, pipeline, source, out)
+        explainer = FitExplainer(pipeline) if explain else None
+        bad += _fit_all(frames, pipeline, source, out, explainer)
     raise typer.Exit(BAD_INPUT if bad else 0)
 
 
@@ -93,7 +99,8 @@ def _collect(inputs: Sequence[Path]) -> tuple[list[FrameFolder], int]:
 
 
 def _fit_all(
-    frames: Sequence[FrameFolder], pipeline: BodyPipeline, source: FrameKeypoints, out: Path
+    frames: Sequence[FrameFolder], pipeline: BodyPipeline, source: FrameKeypoints, out: Path,
+    explainer: FitExplainer | None,
 ) -> int:
     """Fit and write all frames; return how many could not be."""
     from pop_ros.frame_folder import load_frame
@@ -108,6 +115,8 @@ def _fit_all(
                 frame = load_frame(folder.path)
                 result = pipeline.process(frame)
                 write_results(out / folder.name, frame, result, pipeline.model)
+                if explainer is not None:
+                    explainer.write(out / folder.name, folder.path, frame, result)
             except (PopError, OSError) as error:
                 bad += _complain(error)
                 continue
