@@ -45,7 +45,10 @@ def default_library(progress: Progress | None = None, size: int = DEFAULT_SIZE) 
     except LibraryFileError:
         path.unlink()
     library = generate_library(model, size, progress=progress)
-    save_library(library, path, {'origin': 'generated: pose prior and procedural families'})
+    try:
+        save_library(library, path, {'origin': 'generated: pose prior and procedural families'})
+    except OSError:
+        return library  # no room or no right to write: the next start generates it again
     return load_library(path)
 
 

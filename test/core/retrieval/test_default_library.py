@@ -49,6 +49,13 @@ def test_first_use_generates_and_second_use_reads(cache):
     assert default_library_path(SIZE).is_relative_to(cache)
 
 
+def test_a_cache_that_cannot_be_written_costs_only_the_next_start(cache, monkeypatch):
+    blocked = cache / 'file'
+    blocked.write_text('in the way')
+    monkeypatch.setenv('XDG_CACHE_HOME', str(blocked))
+    assert len(default_library(size=SIZE)) == SIZE
+
+
 def test_a_damaged_cache_is_generated_again(cache):
     default_library(size=SIZE)
     path = default_library_path(SIZE)
