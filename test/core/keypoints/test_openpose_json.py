@@ -6,6 +6,7 @@ import pytest
 from pop_core.body.joints import BODY_25_OF_SHARED, N_SHARED, SHARED_INDEX
 from pop_core.errors import KeypointFileError
 from pop_core.geometry.camera import Camera
+from pop_core.keypoints.neck import with_smpl_neck
 from pop_core.keypoints.openpose_json import (
     FileDetector,
     NoKeypointsError,
@@ -23,7 +24,12 @@ def people(rng, n=3):
         scores = rng.uniform(0.1, 1.0, N_SHARED)
         scores[rng.random(N_SHARED) < 0.3] = 0.0
         scores[0] = 0.9
-        out.append(detection_of(rng.uniform(10, 600, (N_SHARED, 2)), scores))
+        keypoints_px = rng.uniform(10, 600, (N_SHARED, 2))
+        # Necks have two places, which a reader tells apart by the shoulders: take SMPL's.
+        shoulders = [SHARED_INDEX['left_shoulder'], SHARED_INDEX['right_shoulder']]
+        keypoints_px[SHARED_INDEX['neck']] = keypoints_px[shoulders].mean(axis=0)
+        given = detection_of(keypoints_px, scores)
+        out.append(detection_of(with_smpl_neck(given.keypoints_px), scores))
     return sorted(out, key=lambda person: -person.score)
 
 
