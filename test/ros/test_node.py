@@ -30,8 +30,8 @@ from pop_ros.to_messages import CLOUD_TYPE
 
 PELVIS_M = 0.05
 PRECISION = 0.9
-# Slow enough that a small machine fits every frame before the next one comes.
-RATE_HZ, SECONDS_PER_FRAME = 5.0, 4.0
+# Two frames are never lost, however slow the machine: one is fitted while the other waits.
+RATE_HZ, SECONDS_PER_FRAME = 5.0, 1.0
 
 
 @pytest.fixture(scope='module')
@@ -119,9 +119,9 @@ def test_when_everybody_has_left_markers_go_and_then_nothing_is_published(
 ) -> None:
     replay(recording.write(tmp_path / 'a.mcap', '16UC1'), tmp_path / 'before', recording)
     present = {marker.id for _, marker in read(tmp_path / 'before', '/pop/mesh')}
-    bag = write_frames(tmp_path / 'b.mcap', empty_frames(recording, 3), '16UC1')
+    bag = write_frames(tmp_path / 'b.mcap', empty_frames(recording, 2), '16UC1')
     summary = replay(bag, tmp_path / 'out', recording)
-    assert (summary.frames, summary.people) == (3, 0)
+    assert (summary.frames, summary.people) == (2, 0), summary.text()
     (_, removal), = read(tmp_path / 'out', '/pop/mesh')
     assert removal.action == 2  # DELETE
     assert removal.id in present
