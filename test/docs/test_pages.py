@@ -29,3 +29,9 @@ def test_commands_that_pages_show_exist(page):
     assert set(re.findall(r'^ *(?:\$ )?pop (\w+)', text, re.MULTILINE)) <= names
     rules = set(re.findall(r'^(\w[\w-]*):', (ROOT / 'Makefile').read_text(), re.MULTILINE))
     assert set(re.findall(r'`make ([\w-]+)`', text)) <= rules
+
+
+def test_the_index_leads_to_every_page():
+    index = (ROOT / 'docs' / 'index.md').read_text(encoding='utf-8')
+    pages = {path.name for path in (ROOT / 'docs').glob('*.md')} - {'index.md'}
+    assert {name for name in pages if f'({name})' not in index} == set()
