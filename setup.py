@@ -53,6 +53,7 @@ setup(
     extras_require={
         'test': ['beartype', 'mypy', 'onnx', 'pytest', 'ruff'],
         'train': ['onnx', 'torch==2.13.0'],
+        'viz': ['rerun-sdk>=0.23'],
         'ray': ['ray'],
     },
     entry_points={

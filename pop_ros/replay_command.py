@@ -36,6 +36,8 @@ def replay(
     pictures: Annotated[Path | None, typer.Option(
         '--pictures', help='Folder for a page with 3D views, and a film, as pop show draws them.',
     )] = None,
+    rerun: Annotated[Path | None, typer.Option(
+        '--rerun', metavar='FILE.rrd', help='Recording for the rerun viewer (extra viz).')] = None,
 ) -> None:
     """Fit the people of a recorded bag and write mesh, joints and points into a new bag."""
     from pop_core.errors import PopError
@@ -55,7 +57,7 @@ def replay(
     typer.echo(f'results: {out}{f" and {ros1}" if ros1 else ""}')
     if not summary.frames:
         raise typer.Exit(1)
-    if pictures is not None:
+    if pictures is not None or rerun is not None:
         from pop_ros.show_command import draw_replay
 
-        draw_replay(request, pictures, summary.text().splitlines())
+        draw_replay(request, pictures, rerun, summary.text().splitlines())

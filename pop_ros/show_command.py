@@ -18,7 +18,10 @@ def show(
     recording: Annotated[Path, typer.Argument(help='Bag of the camera.')],
     bodies: Annotated[Path, typer.Argument(help='Bag that pop replay made of it.')],
     *,
-    out: Annotated[Path, typer.Option('--out', help='Folder for report.html and the film.')],
+    out: Annotated[Path | None, typer.Option(
+        '--out', help='Folder for report.html and the film.')] = None,
+    rerun: Annotated[Path | None, typer.Option(
+        '--rerun', metavar='FILE.rrd', help='Recording for the rerun viewer (extra viz).')] = None,
     film: Annotated[str, typer.Option(
         '--film', help='Name of the film: .mp4, .webp or .gif.')] = 'film.mp4',
     body: Annotated[Path | None, typer.Option(
@@ -29,28 +32,46 @@ def show(
     slop: Annotated[float, typer.Option(
         '--slop', min=0.0, max=10.0, help='Largest difference of stamps of a pair [s].')] = 0.5,
 ) -> None:
-    """Draw recorded bodies over their recording: a page with 3D views, and a film."""
+    """Draw recorded bodies over their recording: a page with 3D views, a film, or for rerun."""
     from pop_core.body.default_body import default_body
     from pop_core.body.model_file import load_body_model
     from pop_ros.show_recording import ShowRequest
 
+    if out is None and rerun is None:
+        raise typer.BadParameter('expected --out, --rerun or both, found neither')
     model = default_body() if body is None else load_body_model(body)
-    _draw(model, ShowRequest(
-        recording=recording, bodies=bodies, out=out, topics=(color, depth, info), slop_s=slop,
-        film=film))
+    _draw(model, rerun, out, ShowRequest(
+        recording=recording, bodies=bodies, out=out or Path(), topics=(color, depth, info),
+        slop_s=slop, film=film))
 
 
-def draw_replay(replayed: ReplayRequest, out: Path, notes: Sequence[str]) -> None:
+def draw_replay(
+    replayed: ReplayRequest, out: Path | None, rerun: Path | None, notes: Sequence[str]
+) -> None:
     """Draw what a replay has just recorded, with what it said."""
     from pop_core.body.default_body import default_body
     from pop_ros.show_recording import ShowRequest
 
-    _draw(default_body(), ShowRequest(
-        recording=replayed.bag, bodies=replayed.out, out=out, topics=replayed.topics,
+    _draw(default_body(), rerun, out, ShowRequest(
+        recording=replayed.bag, bodies=replayed.out, out=out or Path(), topics=replayed.topics,
         slop_s=replayed.slop_s, notes=notes))
 
 
-def _draw(model: BodyModel, request: ShowRequest) -> None:
+def _draw(
+    model: BodyModel, rerun: Path | None, out: Path | None, request: ShowRequest
+) -> None:
+    """Write what was asked for."""
+    if rerun is not None:
+        from pop_ros.rerun_export import write_rerun
+        from pop_ros.show_recording import read_scenes
+
+        frames = write_rerun(read_scenes(request, model), model.f, rerun)
+        typer.echo(f'{rerun}: {frames} frames')
+    if out is not None:
+        _draw_page(model, request)
+
+
+def _draw_page(model: BodyModel, request: ShowRequest) -> None:
     from pop_ros.progress import terminal_progress
     from pop_ros.show_recording import show_recording
 

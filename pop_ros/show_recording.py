@@ -83,7 +83,7 @@ def show_recording(
     counts = _Counts()
     step = 1
     with SummaryFilm(film_path, FILM_HZ) as film:
-        for scene in _scenes(request, model):
+        for scene in read_scenes(request, model):
             picture = four_panels(scene.frame, scene.bodies, model.f)
             film.add(picture)
             if counts.frames % step == 0:
@@ -116,8 +116,12 @@ class _Counts:
             self.hidden += len(body.joint_state) - seen
 
 
-def _scenes(request: ShowRequest, model: BodyModel) -> Iterator[SceneFrame]:
-    """Yield the frames from the first to the last with bodies, those without any among them."""
+def read_scenes(request: ShowRequest, model: BodyModel) -> Iterator[SceneFrame]:
+    """Yield the frames from the first to the last with bodies, those without any among them.
+
+    Raises:
+        PopError: If a bag cannot be read, or the bodies are not of this model.
+    """
     recorded = read_bodies(request.bodies)
     if not recorded:
         raise ShowError(f'{request.bodies}: expected recorded bodies, found none')
