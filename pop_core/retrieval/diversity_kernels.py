@@ -41,6 +41,7 @@ def cover(points, belief, width, chosen, owner):
             near[other, i] = near[i, other]
     own = (belief / belief.max()) ** LOYALTY
     covered = np.zeros(n)
+    free = np.ones(n, dtype=np.bool_)
     owner[:] = 0
     for step in range(chosen.shape[0]):
         best, most = 0, -1.0
@@ -50,9 +51,10 @@ def cover(points, belief, width, chosen, owner):
                 more = near[i, other] - covered[other]
                 if more > 0.0:
                     gain += more * belief[other]
-            if own[i] * gain > most:
+            if free[i] and own[i] * gain > most:
                 best, most = i, own[i] * gain
         chosen[step] = best
+        free[best] = False
         for other in range(n):
             if near[best, other] > covered[other]:
                 covered[other] = near[best, other]

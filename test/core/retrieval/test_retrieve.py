@@ -183,6 +183,16 @@ def test_chosen_poses_stand_for_the_camps_of_belief():
     assert np.allclose(share[np.argsort(camp[chosen])], [0.5, 0.3, 0.2])
 
 
+def test_no_pose_is_chosen_twice_even_where_one_has_all_the_belief():
+    energy = np.full(40, 1e6)
+    energy[5] = 0.0
+    chosen, share = choose_diverse(
+        np.zeros((40, 15, 3)), energy, np.zeros(15, dtype=bool), RetrievalConfig())
+    assert chosen[0] == 5
+    assert len(set(chosen.tolist())) == 6
+    assert np.isclose(share.sum(), 1.0)
+
+
 def test_of_poses_that_agree_the_best_is_chosen():
     rng = np.random.default_rng(1)
     energy = rng.uniform(1, 9, 60)
