@@ -183,6 +183,23 @@ def test_chosen_poses_stand_for_the_camps_of_belief():
     assert np.allclose(share[np.argsort(camp[chosen])], [0.5, 0.3, 0.2])
 
 
+@pytest.mark.parametrize('spread', [
+    (0.0, 0.0, 0.0), (1e-4, 1e-4, 1e-4), (1.0, 0.0, 0.0), (2.0, 2.0, 2.0), (50.0, 50.0, 50.0)])
+@pytest.mark.parametrize('gravity', [None, (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
+def test_joints_that_are_no_person_get_finite_answers(library, spread, gravity):
+    """A point, a line, noise, or things fifty metres apart: a detector may say anything."""
+    rng = np.random.default_rng(3)
+    down = None if gravity is None else np.array(gravity)
+    for seen in (3, 8, 15):
+        joints = rng.normal(size=(15, 3)) * np.array(spread) + [0.0, 0.0, 3.0]
+        hidden = rng.choice(15, 15 - seen, replace=False).tolist()
+        for c in retrieve(library, seen_from(joints, hidden), gravity=down):
+            assert np.isfinite(c.joints_camera).all()
+            assert np.isclose(np.linalg.det(c.R_camera_body), 1.0)
+            assert 0.5 <= c.scale <= 1.25
+            assert 0.0 <= c.weight <= 1.0
+
+
 def test_no_pose_is_chosen_twice_even_where_one_has_all_the_belief():
     energy = np.full(40, 1e6)
     energy[5] = 0.0
