@@ -67,7 +67,8 @@ class RetrievalConfig:
         10.0, unit='deg', minimum=0.0, maximum=90.0,
         about='Where gravity is known: how far poses may lean from upright; 0 allows turns only.')
     same_visibility: bool = setting(
-        False, about='Only poses recorded with the same visible joints, as in the paper; all where '
+        False,
+        about='Only poses recorded with the same visible joints, as in the paper; all where '
         'none was.')
     threads: int = setting(2, minimum=1.0, maximum=64.0, about='Threads of the search.')
 
