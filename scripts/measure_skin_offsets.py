@@ -22,10 +22,10 @@ from pop_core.estimate import JointState
 from pop_core.geometry.transform import transform_points
 from pop_core.keypoints.skin_offsets import facing
 from pop_core.rendering.depth_renderer import render_depth
+from pop_core.rendering.joint_visibility import joint_states, shared_states
 from pop_core.synthesis.cameras import CameraRange, draw_camera
 from pop_core.synthesis.layouts import SceneConfig
 from pop_core.synthesis.people import actor_at, draw_actor, moved_parameters
-from pop_core.rendering.joint_visibility import joint_states, shared_states
 
 PATCH_M = 0.03
 NOSE_ROW = SHARED_NAMES.index('head')
