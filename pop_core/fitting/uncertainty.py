@@ -16,8 +16,8 @@ from pop_core.estimate import JointState
 # synthetic frames cover their share (`python -m benchmarks accuracy`, coverage rows). Errors have
 # heavier tails than a normal distribution: some fits are wrong as a whole.
 INFLATION = {
-    JointState.VISIBLE: 1.15, JointState.SELF_OCCLUDED: 1.35, JointState.SCENE_OCCLUDED: 1.35,
-    JointState.OUT_OF_IMAGE: 1.0, JointState.UNKNOWN: 1.35,
+    JointState.VISIBLE: 1.15, JointState.SELF_OCCLUDED: 1.45, JointState.SCENE_OCCLUDED: 1.45,
+    JointState.OUT_OF_IMAGE: 1.5, JointState.UNKNOWN: 1.45,
 }
 MISFIT_INFLATION = 4.0  # a body that leaves depth unexplained is likelier to be wrong as a whole
 FLOOR_M = 0.006
