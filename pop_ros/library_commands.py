@@ -42,7 +42,7 @@ def build(
         help='Folder with npz files of SMPL poses.', show_default=False)] = None,
     every: Annotated[int, typer.Option(min=1, help='Take every n-th frame.')] = 1,
     spacing: Annotated[float, typer.Option(
-        min=0.0, max=0.5, help='Leave out poses nearer than this [m] to a kept one; 0 keeps '
+        min=0.0, max=0.5, help='Leave out poses nearer than this (m) to a kept one; 0 keeps '
         'all.')] = 0.02,
     mirror: Annotated[bool, typer.Option(help='Add mirror images.')] = True,
     jobs: Annotated[int, typer.Option(min=1, max=256, help='Processes.')] = 2,
@@ -69,7 +69,7 @@ def merge(
     out: Annotated[Path, typer.Argument(metavar='OUT', help='Library file to write.')],
     files: Annotated[list[Path], typer.Argument(metavar='FILES...', help='Libraries.')],
     spacing: Annotated[float, typer.Option(
-        min=0.0, max=0.5, help='Leave out poses nearer than this [m] to a kept one.')] = 0.0,
+        min=0.0, max=0.5, help='Leave out poses nearer than this (m) to a kept one.')] = 0.0,
 ) -> None:
     """Join libraries into one."""
     from pop_core.retrieval.library_merge import merge_libraries
@@ -127,7 +127,7 @@ def query(
     file: LibraryArgument = None,
     pose: Annotated[int, typer.Option(min=0, help='Row of the library to ask for.')] = 0,
     joints: Annotated[Path | None, typer.Option(
-        help='JSON file with 15 rows [x, y, z] in metres, camera frame, null for hidden joints; '
+        help='JSON file with 15 rows (x, y, z) in metres, camera frame, null for hidden joints; '
         'asks for them instead.', show_default=False)] = None,
     hide: Annotated[str, typer.Option(
         metavar='NAMES', help='Joints to hide, such as left_elbow,left_wrist.')] = '',

@@ -27,7 +27,7 @@ def replay(
     depth: Annotated[str | None, typer.Option('--depth', help='Registered depth topic.')] = None,
     info: Annotated[str | None, typer.Option('--info', help='CameraInfo of colour.')] = None,
     slop: Annotated[float, typer.Option(
-        '--slop', min=0.0, max=10.0, help='Largest difference of stamps of a pair [s].')] = 0.03,
+        '--slop', min=0.0, max=10.0, help='Largest difference of stamps of a pair (s).')] = 0.03,
     rate: Annotated[float, typer.Option(
         '--rate', min=0.001, help='Speed at which the node is fed, 1 is as recorded.')] = 1.0,
     every_frame: Annotated[bool, typer.Option(

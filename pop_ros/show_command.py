@@ -30,7 +30,7 @@ def show(
     depth: Annotated[str | None, typer.Option('--depth', help='Registered depth topic.')] = None,
     info: Annotated[str | None, typer.Option('--info', help='CameraInfo of colour.')] = None,
     slop: Annotated[float, typer.Option(
-        '--slop', min=0.0, max=10.0, help='Largest difference of stamps of a pair [s].')] = 0.5,
+        '--slop', min=0.0, max=10.0, help='Largest difference of stamps of a pair (s).')] = 0.5,
 ) -> None:
     """Draw recorded bodies over their recording: a page with 3D views, a film, or for rerun."""
     from pop_core.body.default_body import default_body
