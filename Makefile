@@ -46,6 +46,7 @@ docs: $(VENV)/.tools
 
 pictures: $(VENV)/.tools
 	$(BIN)/python -m scripts.write_pictures docs/pictures
+	$(BIN)/python -m scripts.write_gallery docs/pictures
 
 clean:
 	rm -rf build dist *.egg-info $(DEMO)

@@ -123,7 +123,7 @@ def _points(
 
 def _place(scenes: Sequence[SceneFrame]) -> tuple[Float[np.ndarray, '3'], float]:
     """Return centre and half extent [m] of what the view should contain: the people."""
-    shown = [body.joints for scene in scenes for body in scene.bodies]
+    shown = [body.vertices for scene in scenes for body in scene.bodies]
     if not shown:
         middle = scenes[0].frame
         everywhere = np.ones(middle.depth_m.shape, dtype=bool)

@@ -172,8 +172,8 @@ def _write_page(
 ) -> None:
     report = Report(
         f'pop: {request.recording.name}',
-        f'{counts.people} bodies in {counts.frames} frames; the camera sees {counts.seen} of '
-        f'their {counts.seen + counts.hidden} joints, the others were inferred.')
+        f'Frames: {counts.frames}. Bodies: {counts.people}. The camera sees {counts.seen} of '
+        f'their {counts.seen + counts.hidden} joints; the others were inferred.')
     report.scenes([scene for scene, _ in _evenly(kept, MAX_SCENES)], model.f)
     report.text(HOW_TO_TURN)
     report.heading('Frame by frame')

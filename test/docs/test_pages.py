@@ -26,7 +26,7 @@ def test_commands_that_pages_show_exist(page):
     text = page.read_text(encoding='utf-8')
     from pop_ros.cli import COMMANDS
     names = {command.name for command in COMMANDS}
-    assert set(re.findall(r'^ *(?:\$ )?pop (\w+)', text, re.MULTILINE)) <= names
+    assert set(re.findall(r'^ *(?:\$ )?pop ([\w-]+)', text, re.MULTILINE)) <= names
     rules = set(re.findall(r'^(\w[\w-]*):', (ROOT / 'Makefile').read_text(), re.MULTILINE))
     assert set(re.findall(r'`make ([\w-]+)`', text)) <= rules
 

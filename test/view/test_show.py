@@ -62,7 +62,7 @@ def test_the_page_holds_a_3d_view_a_strip_and_what_the_replay_said(drawn: Path) 
     assert [frame['caption'] for frame in strip] == captions
     assert [frame['caption'] for frame in scenes['frames']] == captions
     assert [len(frame['bodies']) for frame in scenes['frames']] == [1, 0, 1]
-    assert '2 bodies in 3 frames' in text
+    assert 'Frames: 3. Bodies: 2.' in text
     assert '2 frames fitted of 3 pairs' in text
 
 
