@@ -15,6 +15,8 @@ from jaxtyping import Float
 from rclpy.serialization import deserialize_message, serialize_message
 from visualization_msgs.msg import Marker
 
+from pop_ros.plain_cdr import with_zero_padding
+
 SENTINEL = (-1.2345678901234567e300, 3.1415926535897933e-300, 2.7182818284590452e250)
 LITTLE_ENDIAN = 1
 STAMP_OFFSET = 4  # behind the encapsulation header: int32 seconds, uint32 nanoseconds
@@ -70,7 +72,7 @@ def split_at_points(marker: Marker) -> tuple[bytes, bytes, bytes] | None:
     """
     x, y, z = SENTINEL
     marker.points = [Point(x=x, y=y, z=z)]
-    data = bytes(serialize_message(marker))
+    data = with_zero_padding(bytes(serialize_message(marker)), 'visualization_msgs/msg/Marker')
     at = data.find(struct.pack('<3d', *SENTINEL))
     if at < 0 or data[1] != LITTLE_ENDIAN:
         return None

@@ -19,6 +19,7 @@ from pop_ros.explanation import explain_refused_pairs
 from pop_ros.frame_fitter import FrameFitter
 from pop_ros.from_messages import stamp_ns
 from pop_ros.pairing import FramePairer
+from pop_ros.plain_cdr import with_zero_padding
 from pop_ros.statistics import drop_reason
 
 OUTPUT_NAMESPACE = '/pop'
@@ -168,5 +169,7 @@ def _fit_and_write(
     fitted = fitter.fit(color, frame.depth.read(), frame.info.read())
     summary.people += len(fitted.result.bodies)
     for name, message in fitted.outputs:
-        data = message if isinstance(message, bytes) else bytes(serialize_message(message))
+        # The same frames give the same bytes, so that results can be compared as files.
+        data = message if isinstance(message, bytes) else with_zero_padding(
+            bytes(serialize_message(message)), KINDS[name])
         writer.write(f'{OUTPUT_NAMESPACE}/{name}', KINDS[name], stamp_ns(color.header), data)
