@@ -3,7 +3,8 @@
     python -m benchmarks retrieval [PART ...] [--json FILE]
 
 Parts: search (1.6 M poses), recall and coverage (held-back motion capture), build (1 M poses from
-files), shortlist (an approximate index against the exact search); without any, all of them.
+files), shortlist (a k-d tree against the exact search), index (faiss and hnswlib against it, where
+installed); without any, all of them.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.retrieval_build import measure_build
+from benchmarks.retrieval_index import measure_index
 from benchmarks.retrieval_recall import measure_coverage, measure_recall
 from benchmarks.retrieval_search import measure_search, measure_shortlist
 
@@ -39,13 +41,17 @@ def run(arguments: list[str]) -> int:
         'shortlist': (
             'Exact search against a k-d tree shortlist',
             lambda: measure_shortlist(options.queries)),
+        'index': (
+            'Exact search of all or of an index\'s list: time, best 16 found, by share hidden',
+            lambda: measure_index(options.mocap, options.queries, options.index_poses)),
     }
     results = {}
     for name in options.parts or parts:
         title, measure = parts[name]
         console.print(f'measuring {name} ...')
         results[name] = measure()
-        console.print(table(title, results[name]))
+        if results[name]:
+            console.print(table(title, results[name]))
     if options.json is not None:
         options.json.write_text(json.dumps(results, indent=1), encoding='utf-8')
     return 0
@@ -54,12 +60,14 @@ def run(arguments: list[str]) -> int:
 def parse(arguments: list[str]) -> argparse.Namespace:
     """Return the options of the command line."""
     parser = argparse.ArgumentParser(prog='python -m benchmarks retrieval', description=__doc__)
-    names = ('search', 'recall', 'coverage', 'build', 'shortlist')
+    names = ('search', 'recall', 'coverage', 'build', 'shortlist', 'index')
     parser.add_argument('parts', nargs='*', choices=[*names, []], help='what to measure')
     parser.add_argument('--poses', type=int, default=1_600_000, help='size of the large library')
     parser.add_argument('--queries', type=int, default=30, help='queries to take the median of')
     parser.add_argument('--frames', type=int, default=300, help='held-back frames')
     parser.add_argument('--build-poses', type=int, default=1_000_000, help='poses to build from')
+    parser.add_argument(
+        '--index-poses', type=int, default=150_000, help='poses of the library that is indexed')
     parser.add_argument(
         '--mocap', type=Path, default=Path('../shared/data/mocap/cmu_smpl_train.npz'))
     parser.add_argument('--json', type=Path, help='file to write all figures into')

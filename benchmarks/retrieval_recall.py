@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -103,15 +104,13 @@ def recorded_behind_things(library: PoseLibrary) -> PoseLibrary:
     return PoseLibrary(library.body_pose, library.tilt, library.columns, masks, library.weights)
 
 
-def _errors(
-    library: PoseLibrary, root: np.ndarray, body: np.ndarray, share: float,
-    config: RetrievalConfig, gravity: np.ndarray | None,
-) -> np.ndarray:
-    """Return the mean joint error of the best answer to each query [m]."""
+def seen_by_camera(
+    root: np.ndarray, body: np.ndarray, share: float
+) -> Iterator[tuple[LiftedJoints, np.ndarray]]:
+    """Yield what a camera lifts of each pose, and all its joints (15,3) in the camera [m]."""
     rng = np.random.default_rng(2)
     model = default_body()
     points = shared_points(model)
-    errors = []
     for turn, pose in zip(root, body, strict=True):
         betas = rng.normal(size=model.n_betas) * SHAPE_SIGMA
         upright = attached_positions(
@@ -124,6 +123,16 @@ def _errors(
         lifted = LiftedJoints(
             seen, np.where(hidden, np.inf, SIGMA_M), np.where(hidden, 1, 0),
             np.full((15, 2), np.nan), np.ones(15))
+        yield lifted, truth
+
+
+def _errors(
+    library: PoseLibrary, root: np.ndarray, body: np.ndarray, share: float,
+    config: RetrievalConfig, gravity: np.ndarray | None,
+) -> np.ndarray:
+    """Return the mean joint error of the best answer to each query [m]."""
+    errors = []
+    for lifted, truth in seen_by_camera(root, body, share):
         answers = retrieve(library, lifted, config, gravity=gravity)
         errors.append(min(
             np.linalg.norm(a.joints_camera - truth, axis=1).mean() for a in answers))

@@ -27,7 +27,7 @@ def measure_search(poses: int, queries: int) -> list[dict[str, object]]:
     rows = [_search_row('default', default, queries, 0.0)]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / 'large.poplib'
-        _write_large(path, default, poses)
+        write_large(path, default, poses)
         before = resident_mb()
         large = load_library(path)
         rows.append(_search_row('large', large, queries, before))
@@ -96,7 +96,7 @@ def _search_row(
     }
 
 
-def _write_large(path: Path, library: PoseLibrary, poses: int) -> None:
+def write_large(path: Path, library: PoseLibrary, poses: int) -> None:
     """Write jittered copies of a library until there are enough poses."""
     rng = np.random.default_rng(0)
     with new_library_file(path, poses, {'origin': 'benchmark'}) as arrays:
