@@ -31,7 +31,9 @@ class EstimateStatus(Enum):
     )
     TOO_FAR = 'beyond max_range_m'
     NO_SUPPORT = 'the fitted body does not explain the depth of its pixels: probably no person'
-    DUPLICATE = 'the same person as a better detection'
+    NO_SKELETON = (
+        'no human pose comes near the lifted joints: the keypoints are not those of one person'
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

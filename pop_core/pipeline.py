@@ -17,6 +17,7 @@ from pop_core.estimate import BodyEstimate, EstimateStatus, FrameResult
 from pop_core.fitting.body_fit import BodyFit, BodyFitter
 from pop_core.fitting.joint_state import fitted_joint_states
 from pop_core.fitting.observation import Observation, observe
+from pop_core.fitting.plausibility import plausibility
 from pop_core.fitting.uncertainty import joint_covariance
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.detection import Detection, KeypointDetector
@@ -35,6 +36,7 @@ from pop_core.segmentation.depth_support import depth_support
 from pop_core.segmentation.ground import Ground, find_ground
 from pop_core.stopwatch import Stopwatch
 
+SMALLEST_EXTENT_M = 0.15  # joints nearer together than this are no skeleton
 SAME_PLACE_M = 0.3  # a person behind another is often lifted onto the one in front
 
 
@@ -69,7 +71,7 @@ class BodyPipeline:
         self.config = config or PipelineConfig()
         self.fitter = BodyFitter(
             model, prior or load_pose_prior(), self.config.fitting, self.config.segmentation)
-        # Small products are slower on several BLAS threads than on one (benchmarks/solver).
+        # Small products are slower on several BLAS threads than on one.
         self._blas = ThreadpoolController()
 
     def process(self, frame: RgbdFrame) -> FrameResult:
@@ -95,10 +97,10 @@ class BodyPipeline:
         """Fit one person after the other, nearest first, each an occluder of the next."""
         with watch.step('lift'):
             lifted = [self._lift(frame, detection) for detection in detections]
-        distance_m = [_distance_m(joints) for joints in lifted]
+        distance_m = [joints.distance_m for joints in lifted]
         with watch.step('ground'):
             ground = find_ground(frame) if self.config.use_ground else None
-        statuses = [self._admit(j, z) for j, z in zip(lifted, distance_m, strict=True)]
+        statuses = [self._admit(joints) for joints in lifted]
         scene = Scene(frame, ground, np.zeros(frame.depth_m.shape, dtype=bool))
         bodies: list[BodyEstimate] = []
         for i in _nearest_first(distance_m, detections):
@@ -122,18 +124,21 @@ class BodyPipeline:
         if covers_keypoints(scene.taken, detection):
             with watch.step('lift'):
                 lifted = self._lift(without_depth(scene.frame, scene.taken), detection)
-            if self._admit(lifted, _distance_m(lifted)) is not EstimateStatus.OK:
-                return None, EstimateStatus.TOO_FEW_JOINTS
+            status = self._admit(lifted)
+            if status is not EstimateStatus.OK:
+                return None, status
         with watch.step('observe'):
             observation = observe(
                 scene.frame, lifted, scene.taken, scene.ground, detection.part_labels)
         with watch.step('retrieve'):
             candidates = self._retrieve(lifted, observation, scene.frame.camera)
+        if not candidates or candidates[0].residual_m > self.config.max_residual_m:
+            return None, EstimateStatus.NO_SKELETON
         with watch.step('fit'):
             fit = self.fitter.fit(observation, candidates)
         with watch.step('segment'):
-            estimate = self._estimate(scene, fit)
-        if estimate.score < self.config.min_support:
+            estimate, support = self._estimate(scene, fit, lifted)
+        if support < self.config.min_support:
             return None, EstimateStatus.NO_SUPPORT
         return estimate, EstimateStatus.OK
 
@@ -158,8 +163,10 @@ class BodyPipeline:
             self.library, lifted, self.config.retrieval, hides=in_the_open_m, gravity=gravity,
             camera=camera)
 
-    def _estimate(self, scene: Scene, fit: BodyFit) -> BodyEstimate:
-        """Return the result of a fit at the frame's full resolution."""
+    def _estimate(
+        self, scene: Scene, fit: BodyFit, lifted: LiftedJoints
+    ) -> tuple[BodyEstimate, float]:
+        """Return the result of a fit at the frame's full resolution, and its depth support."""
         frame, parameters = scene.frame, fit.parameters
         mesh = vertices(self.model, parameters)
         rendered = render_depth(mesh, self.model.f, frame.camera)
@@ -174,17 +181,20 @@ class BodyPipeline:
         support = depth_support(frame.depth_m, rendered, own)
         covariance = joint_covariance(
             self.model, parameters, fit.hessian, fit.runners_up, state, support)
-        return BodyEstimate(
+        estimate = BodyEstimate(
             parameters=parameters, vertices=mesh, joints=joints,
             joint_rotations=joint_rotations(self.model, parameters), joint_state=state,
-            joint_covariance=covariance, mask=mask, score=support,
+            joint_covariance=covariance, mask=mask, score=support * plausibility(fit, lifted),
             energies=fit.energies, runners_up=fit.runners_up,
         )
+        return estimate, support
 
-    def _admit(self, lifted: LiftedJoints, distance_m: float) -> EstimateStatus:
+    def _admit(self, lifted: LiftedJoints) -> EstimateStatus:
         if int(lifted.lifted.sum()) < self.config.min_joints:
             return EstimateStatus.TOO_FEW_JOINTS
-        if distance_m > self.config.max_range_m:
+        if lifted.extent_m < SMALLEST_EXTENT_M:
+            return EstimateStatus.NO_SKELETON
+        if lifted.distance_m > self.config.max_range_m:
             return EstimateStatus.TOO_FAR
         return EstimateStatus.OK
 
@@ -208,9 +218,3 @@ def _nearest_first(
     """Return the order of people: nearest first, and of two in one place the better seen."""
     place = np.floor(np.minimum(distance_m, 1e6) / SAME_PLACE_M)
     return np.lexsort((-np.array([d.scores.sum() for d in detections]), place))
-
-
-def _distance_m(lifted: LiftedJoints) -> float:
-    """Return the median depth of the lifted joints [m]; inf when there are none."""
-    z = lifted.positions_camera[lifted.lifted, 2]
-    return float(np.median(z)) if len(z) else float('inf')

@@ -132,6 +132,7 @@ class RgbdInputs:
         self._depth_info: CameraInfo | None = None
         self._without_info: Pair[Any] | None = None
         self.last_frame_s = time.monotonic()
+        self._following = False
         self.topics = (
             InputTopic(node, COLOR, self._on_color),
             InputTopic(node, DEPTH, self._on_depth),
@@ -141,11 +142,15 @@ class RgbdInputs:
 
     def follow(self, reliability: str) -> None:
         """Subscribe what is published."""
+        if not self._following:
+            # Silence counts from here: a node may have loaded its library for a minute before.
+            self._following, self.last_frame_s = True, time.monotonic()
         for topic in self.topics:
             topic.follow(reliability)
 
     def leave(self) -> None:
         """Unsubscribe everything; what comes next may be another camera."""
+        self._following = False
         for topic in self.topics:
             topic.leave()
         self._info = self._depth_info = None

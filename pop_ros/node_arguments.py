@@ -71,7 +71,8 @@ def parse_arguments(arguments: Sequence[str]) -> NodeArguments:
         description='Fit people to RGB-D images: mesh, joints and points of every person.')
     parser.add_argument(
         '--keypoints', default='depth', metavar='SOURCE',
-        help='json, depth (embedded network) or the path of an ONNX network')
+        help='json (OpenPose files) or the path of an ONNX network; depth, the embedded network, '
+             'is not in this version')
     parser.add_argument(
         '--keypoints-dir', type=Path, metavar='DIR',
         help='folder of OpenPose files named <stamp_ns>.json, for --keypoints json')

@@ -18,7 +18,8 @@ def replay(
     ros1: Annotated[Path | None, typer.Option(
         '--ros1', help='Also write the results as this ROS 1 bag.')] = None,
     keypoints: Annotated[str, typer.Option(
-        '--keypoints', help='json, depth or the path of an ONNX network.')] = 'depth',
+        '--keypoints', help='json (OpenPose files) or the path of an ONNX network; depth, the '
+                            'embedded network, is not in this version.')] = 'depth',
     keypoints_dir: Annotated[Path | None, typer.Option(
         '--keypoints-dir', help='Folder of <stamp_ns>.json files.')] = None,
     decoder: Annotated[str | None, typer.Option(

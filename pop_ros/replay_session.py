@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from pop_ros.node_arguments import SourceArguments
 from pop_ros.node_config import NodeConfig
 from pop_ros.replay import ReplaySummary, replay_every_frame
 from pop_ros.replay_dds import READY_S, DdsPlayer, NodeProcess, bag_transports
+from pop_ros.sources import make_detector
 
 RUNNING_NODE_S = 30.0
 
@@ -88,6 +90,9 @@ def _over_dds(
 ) -> ReplaySummary:
     summary = ReplaySummary()
     writer = BagWriter(request.out, request.ros1)
+    if not request.node_running:
+        # A source that does not exist is refused here, before a node starts.
+        make_detector(*dataclasses.astuple(request.sources))
     node = None if request.node_running else NodeProcess(request.sources, request.slop_s)
     check = (lambda: None) if node is None else node.check
     try:

@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from pop_core.errors import CameraError
 
+FOCAL_PX = (1.0, 1e6)  # no lens is shorter or longer
 DISTORTION_LENGTHS = {
     '': (0,),
     'plumb_bob': (0, 4, 5),
@@ -55,20 +56,26 @@ class Camera:
 
     def __post_init__(self) -> None:
         numbers = np.array([self.fx, self.fy, self.cx, self.cy])
-        if not (np.isfinite(numbers).all() and self.fx > 0 and self.fy > 0):
+        low, high = FOCAL_PX
+        if not (np.isfinite(numbers).all() and low <= min(numbers[:2]) and max(numbers) <= high):
             raise CameraError(
-                f'camera: expected finite intrinsics with positive fx and fy, found fx={self.fx} '
-                f'fy={self.fy} cx={self.cx} cy={self.cy}: is the camera calibrated?'
+                f'camera: expected finite intrinsics with fx and fy of {low} to {high} px, found '
+                f'fx={self.fx} fy={self.fy} cx={self.cx} cy={self.cy}: is the camera calibrated?'
             )
         if self.width <= 0 or self.height <= 0:
             raise CameraError(
                 f'camera: expected a positive size, found {self.width}x{self.height}'
             )
         allowed = DISTORTION_LENGTHS.get(self.distortion_model)
-        if allowed is None or self.d.size not in allowed or not np.isfinite(self.d).all():
+        if allowed is None:
             raise CameraError(
-                f'camera: expected one of {list(DISTORTION_LENGTHS)} with finite coefficients, '
-                f'found {self.distortion_model!r} with d={self.d.tolist()}'
+                f'camera: expected distortion model one of {list(DISTORTION_LENGTHS)}, found '
+                f'{self.distortion_model!r}'
+            )
+        if self.d.size not in allowed or not np.isfinite(self.d).all():
+            raise CameraError(
+                f'camera: expected {" or ".join(map(str, allowed))} finite coefficients of '
+                f'{self.distortion_model or "no distortion"}, found {self.d.tolist()}'
             )
 
     @property

@@ -38,6 +38,18 @@ class LiftedJoints:
     scores: Float[np.ndarray, 's']
 
     @property
+    def distance_m(self) -> float:
+        """Return the median depth of the lifted joints [m]; inf when there are none."""
+        z = self.positions_camera[self.lifted, 2]
+        return float(np.median(z)) if len(z) else float('inf')
+
+    @property
+    def extent_m(self) -> float:
+        """Return the longest side of the box around the lifted joints [m]; 0 without joints."""
+        seen = self.positions_camera[self.lifted]
+        return float(np.ptp(seen, axis=0).max()) if len(seen) else 0.0
+
+    @property
     def lifted(self) -> Bool[np.ndarray, 's']:
         """Return which joints have a position."""
         return np.isfinite(self.positions_camera).all(axis=1)

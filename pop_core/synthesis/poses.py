@@ -148,7 +148,7 @@ def _draw_seated(model: BodyModel, rng: np.random.Generator) -> ScenePose:
         ['thigh', 'forward', 'folded', 'face', 'hang'], p=[0.45, 0.2, 0.15, 0.1, 0.1])
     for side in ('left', 'right'):
         if rng.random() < 0.25:
-            style = rng.choice(['thigh', 'forward', 'face'])
+            style = _one_of(rng, 'thigh', 'forward', 'face')
         pose = arm_in_style(model, pose, side, style, rng)
     return ScenePose('seated', pose, np.array([lean, 0.0, 0.0]))
 
@@ -162,7 +162,7 @@ def _draw_lying(model: BodyModel, rng: np.random.Generator) -> ScenePose:
         flex(pose, f'{side}_knee', -bend * share * 1.7)
     look_around(pose, rng)
     for side in ('left', 'right'):
-        pose = arm_in_style(model, pose, side, rng.choice(['hang', 'folded', 'out']), rng)
+        pose = arm_in_style(model, pose, side, _one_of(rng, 'hang', 'folded', 'out'), rng)
     on_back = from_rotvec(np.array([-np.pi / 2, 0.0, 0.0]))
     roll = rng.choice([0.0, np.pi / 2, -np.pi / 2], p=[0.5, 0.25, 0.25]) + rng.normal(0, 0.15)
     return ScenePose('lying', pose, to_rotvec(on_back @ from_rotvec(np.array([0.0, roll, 0.0]))))
@@ -174,8 +174,8 @@ def _draw_reaching(model: BodyModel, rng: np.random.Generator) -> ScenePose:
     flex(pose, 'left_hip', rng.uniform(0.0, 0.4))
     flex(pose, 'left_knee', -rng.uniform(0.0, 0.4))
     look_around(pose, rng)
-    pose = arm_in_style(model, pose, 'left', rng.choice(['forward', 'up', 'out', 'high']), rng)
-    pose = arm_in_style(model, pose, 'right', rng.choice(['hang', 'forward', 'up', 'hip']), rng)
+    pose = arm_in_style(model, pose, 'left', _one_of(rng, 'forward', 'up', 'out', 'high'), rng)
+    pose = arm_in_style(model, pose, 'right', _one_of(rng, 'hang', 'forward', 'up', 'hip'), rng)
     return ScenePose('reaching', pose, np.array([rng.uniform(-0.05, 0.15), 0.0, 0.0]))
 
 
@@ -199,7 +199,7 @@ def _draw_bending(model: BodyModel, rng: np.random.Generator) -> ScenePose:
         flex(pose, f'{side}_knee', -knee)
     bend_spine(pose, rng.uniform(0.2, 0.9))
     for side in ('left', 'right'):
-        pose = arm_in_style(model, pose, side, rng.choice(['forward', 'down', 'thigh']), rng)
+        pose = arm_in_style(model, pose, side, _one_of(rng, 'forward', 'down', 'thigh'), rng)
     return ScenePose('bending', pose, np.array([tilt, 0.0, 0.0]))
 
 
@@ -214,7 +214,7 @@ def _draw_crouching(model: BodyModel, rng: np.random.Generator) -> ScenePose:
     bend_spine(pose, rng.uniform(0.1, 0.6))
     look_around(pose, rng)
     for side in ('left', 'right'):
-        pose = arm_in_style(model, pose, side, rng.choice(['forward', 'thigh', 'face']), rng)
+        pose = arm_in_style(model, pose, side, _one_of(rng, 'forward', 'thigh', 'face'), rng)
     return ScenePose('crouching', pose, np.array([tilt, 0.0, 0.0]))
 
 
@@ -225,3 +225,7 @@ _DRAWS: dict[str, Callable[[BodyModel, np.random.Generator], ScenePose]] = {
 }
 _STANDING_ARMS = ['hang', 'hip', 'folded', 'forward', 'face', 'up', 'out']
 _STANDING_ARM_SHARES = [0.42, 0.12, 0.12, 0.14, 0.1, 0.05, 0.05]
+
+
+def _one_of(rng: np.random.Generator, *names: str) -> str:
+    return names[int(rng.integers(len(names)))]

@@ -178,8 +178,8 @@ def test_pop_fit_loads_no_ros():
 
 def test_a_status_names_every_reason_once():
     from pop_core.estimate import EstimateStatus, FrameResult
-    statuses = (EstimateStatus.TOO_FAR, EstimateStatus.TOO_FAR, EstimateStatus.DUPLICATE)
+    statuses = (EstimateStatus.TOO_FAR, EstimateStatus.TOO_FAR, EstimateStatus.NO_SKELETON)
     sentence = status_sentence(FrameResult((), statuses, {}))
     assert sentence == (
         'nobody found; 2 not fitted: beyond max_range_m; '
-        '1 not fitted: the same person as a better detection')
+        '1 not fitted: ' + EstimateStatus.NO_SKELETON.value)
