@@ -19,11 +19,13 @@ def demo(
 
     The first run also generates the pose library and compiles the kernels: a minute or two more.
     """
+    from pop_ros.dds_profile import use_large_shared_memory
     from pop_ros.demo import draw_frames, play_to_node, prepare_folder, record_scenes
     from pop_ros.demo_report import error_rows, write_demo_report
     from pop_ros.progress import terminal_progress
 
     _keep_to_ourselves()
+    use_large_shared_memory()
     paths = prepare_folder(out)
     typer.echo(f'1/4 synthesising {frames} frames')
     with terminal_progress() as display:

@@ -42,9 +42,11 @@ def replay(
 ) -> None:
     """Fit the people of a recorded bag and write mesh, joints and points into a new bag."""
     from pop_core.errors import PopError
+    from pop_ros.dds_profile import use_large_shared_memory
     from pop_ros.node_arguments import SourceArguments
     from pop_ros.replay_session import ReplayRequest, run_replay
 
+    use_large_shared_memory()
     request = ReplayRequest(
         bag=bag, out=out, ros1=ros1, sources=SourceArguments(keypoints, keypoints_dir, decoder),
         topics=(color, depth, info), slop_s=slop, rate=rate, every_frame=every_frame,
