@@ -144,8 +144,8 @@ def _draw_seated(model: BodyModel, rng: np.random.Generator) -> ScenePose:
         flex(pose, f'{side}_knee', -np.deg2rad(rng.uniform(65, 100)))
     bend_spine(pose, rng.uniform(0.0, 0.5))
     look_around(pose, rng)
-    style = rng.choice(
-        ['thigh', 'forward', 'folded', 'face', 'hang'], p=[0.45, 0.2, 0.15, 0.1, 0.1])
+    style = str(rng.choice(
+        ['thigh', 'forward', 'folded', 'face', 'hang'], p=[0.45, 0.2, 0.15, 0.1, 0.1]))
     for side in ('left', 'right'):
         if rng.random() < 0.25:
             style = _one_of(rng, 'thigh', 'forward', 'face')
