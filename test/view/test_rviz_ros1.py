@@ -62,7 +62,8 @@ def picture(
             screen.wait_for(
                 lambda topic=topic: 'rviz' in screen.ask('rostopic', 'info', topic),
                 f'rviz listening to {topic}')
-        screen.start('rosbag', 'play', '--quiet', '--keep-alive', bodies[0])
+        # Messages sent before rviz has connected to the player are lost: it waits for that.
+        screen.start('rosbag', 'play', '--quiet', '--keep-alive', '--delay=3', bodies[0])
         seen = [screen.photograph(folder / 'rviz.png')]
 
         def has_settled() -> bool:
