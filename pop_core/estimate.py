@@ -36,6 +36,34 @@ class EstimateStatus(Enum):
     )
 
 
+class TrackState(IntEnum):
+    """Where a tracked person is in the life of their track."""
+
+    NEW = 0  # seen too few times to be sure of
+    TRACKED = 1  # seen in this frame
+    PREDICTED = 2  # hidden in this frame; where they should be by now
+    LOST = 3  # hidden for long, or not where they should be: waits to be found again
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """Which person of a sequence a body is, and how fresh the evidence for it.
+
+    Args:
+        id: Number of the person; never given to a second one.
+        state: Where the person is in the life of the track.
+        age_s: Time since the person was first seen [s].
+        unseen_s: Time since any of the person was last seen [s].
+        joint_unseen_s: Time since each joint was last seen [s]; its track's age if it never was.
+    """
+
+    id: int
+    state: TrackState
+    age_s: float
+    unseen_s: float
+    joint_unseen_s: Float[np.ndarray, '24']
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyEstimate:
     """One fitted person.
@@ -51,6 +79,7 @@ class BodyEstimate:
         score: Confidence 0..1 that this is a person fitted right.
         energies: Final energies by name.
         runners_up: Parameters of the other hypotheses, best first.
+        track: Which person of a sequence this is; None where each frame stands alone.
     """
 
     parameters: BodyParameters
@@ -63,6 +92,7 @@ class BodyEstimate:
     score: float
     energies: Mapping[str, float] = field(default_factory=dict)
     runners_up: tuple[BodyParameters, ...] = ()
+    track: Track | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,7 +101,8 @@ class FrameResult:
 
     Args:
         bodies: Fitted people, nearest first.
-        statuses: One status per detection, in the detector's order.
+        statuses: One status per detection, in the detector's order; none in frames of a
+            sequence that were followed without asking the detector.
         times_ms: Wall time per step [ms].
     """
 

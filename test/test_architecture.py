@@ -11,7 +11,8 @@ ROOT = Path(__file__).resolve().parents[1]
 # Top to bottom: a module may import its own part and what stands on lines below.
 LAYERS = (
     ('pop_ros',),
-    ('pop_core.pipeline', 'pop_core.tracking'),
+    ('pop_core.tracking',),
+    ('pop_core.pipeline',),
     ('pop_core.config',),
     ('pop_core.fitting',),
     ('pop_core.segmentation', 'pop_core.retrieval'),
