@@ -14,13 +14,12 @@ from types import TracebackType
 from typing import Any
 
 from rosbags.highlevel import AnyReader
-from rosbags.typesys import Stores, get_typestore
 
 from pop_core.errors import PopError
 from pop_ros.bag_salvage import is_ros1_bag, salvage
+from pop_ros.ros1_conversion import STORE, ros1_to_cdr
 
 SUFFIXES = ('.bag', '.db3', '.mcap')
-STORE = get_typestore(Stores.ROS2_JAZZY)
 
 
 class BagError(PopError):
@@ -138,13 +137,17 @@ class BagReader:
     def _salvaged(self, topics: Collection[str]) -> Iterator[BagMessage]:
         for path in self._storage_files():
             for m in salvage(path):
-                if m.topic in topics:
+                if m.topic not in topics:
+                    continue
+                try:
                     data = _as_cdr(m.data, m.kind, is_ros2=not is_ros1_bag(path))
-                    yield BagMessage(m.topic, m.kind, m.time_ns, data)
+                except Exception:  # noqa: BLE001 - rosbags passes on what struct and numpy raise
+                    break  # whatever follows the damage cannot be trusted
+                yield BagMessage(m.topic, m.kind, m.time_ns, data)
 
 
 def _as_cdr(raw: bytes | memoryview, kind: str, *, is_ros2: bool) -> bytes:
-    return bytes(raw) if is_ros2 else bytes(STORE.ros1_to_cdr(raw, kind))
+    return bytes(raw) if is_ros2 else ros1_to_cdr(bytes(raw), kind)
 
 
 def _files(path: Path) -> list[Path]:

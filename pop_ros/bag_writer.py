@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, is_dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -10,18 +9,9 @@ from typing import Any
 from rosbags.rosbag1 import Writer as Ros1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Ros2Writer
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from pop_ros.bag_reader import STORE, BagError
-from pop_ros.pop_messages import definition_files
-
-ROS1_STORE = get_typestore(Stores.ROS1_NOETIC)
-for file in definition_files():
-    definition = get_types_from_msg(file.read_text(encoding='utf-8'), f'pop_msgs/msg/{file.stem}')
-    STORE.register(definition)
-    ROS1_STORE.register(definition)
-# Types whose layout ROS 2 has extended; they are rewritten field by field.
-EXTENDED_IN_ROS2 = {'visualization_msgs/msg/Marker'}
+from pop_ros.bag_reader import BagError
+from pop_ros.ros1_conversion import ROS1_STORE, STORE, cdr_to_ros1
 
 
 class BagWriter:
@@ -76,23 +66,3 @@ class BagWriter:
         if self._ros1 is not None:
             self._ros1.write(ros1, time_ns, cdr_to_ros1(data, kind))
         self.counts[topic] = self.counts.get(topic, 0) + 1
-
-
-def cdr_to_ros1(data: bytes, kind: str) -> bytes:
-    """Return a message of ROS 2 as ROS 1 serialises it; fields ROS 1 does not have are dropped."""
-    if kind not in EXTENDED_IN_ROS2:
-        return bytes(STORE.cdr_to_ros1(data, kind))
-    message = _as_ros1(STORE.deserialize_cdr(data, kind))
-    return bytes(ROS1_STORE.serialize_ros1(message, kind))
-
-
-def _as_ros1(value: Any) -> Any:
-    """Return a rosbags message as the ROS 1 type of the same name."""
-    if isinstance(value, list):
-        return [_as_ros1(item) for item in value]
-    if not is_dataclass(value):
-        return value
-    kind: Any = ROS1_STORE.types[value.__msgtype__]  # type: ignore[union-attr]
-    names = [field.name for field in fields(kind) if field.name != '__msgtype__']
-    # Only the sequence number of headers is missing in ROS 2; in bags nobody needs it.
-    return kind(**{name: _as_ros1(getattr(value, name, 0)) for name in names})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pop_ros.bag_reader import STORE
+from pop_ros.ros1_conversion import STORE
 
 
 def with_zero_padding(data: bytes, kind: str) -> bytes:

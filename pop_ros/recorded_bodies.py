@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from pop_core.rendering.shown_body import ShownBody
 from pop_core.rgbd import RgbdFrame
 from pop_ros.bag_reader import BagReader
 from pop_ros.from_messages import stamp_ns
+from pop_ros.ros1_conversion import read_marker
 from pop_ros.to_messages import CLOUD_TYPE
 
 MESH, JOINTS, CLOUD = '/pop/mesh', '/pop/joints', '/pop/cloud'
@@ -53,8 +53,12 @@ def read_bodies(bag: Path) -> dict[int, RecordedFrame]:
     frames: dict[int, RecordedFrame] = defaultdict(RecordedFrame)
     with BagReader(bag) as reader:
         for message in reader.messages([MESH, JOINTS, CLOUD]):
-            content = message.read()
-            _add(frames[stamp_ns(content.header)], message.topic, content)
+            if message.topic == MESH:
+                marker, corners = read_marker(message.data)
+                _add_mesh(frames[stamp_ns(marker.header)], marker, corners)
+            else:
+                content = message.read()
+                _add(frames[stamp_ns(content.header)], message.topic, content)
     return dict(frames)
 
 
@@ -101,17 +105,12 @@ def cloud_mask(points: np.ndarray, camera: Camera) -> Bool[np.ndarray, 'h w']:
 def _add(frame: RecordedFrame, topic: str, content: Any) -> None:
     if topic == CLOUD:
         frame.cloud = np.frombuffer(bytes(content.data), CLOUD_TYPE)
-    elif topic == JOINTS:
-        places = [_xyz(pose.position) for pose in content.poses]
+    else:
+        places = [(p.position.x, p.position.y, p.position.z) for p in content.poses]
         frame.joints = np.array(places, dtype=np.float64).reshape(-1, N_JOINTS, 3)
-    elif content.action == ADD:
-        frame.triangles.append(_all_xyz(content.points))
-        frame.ids.append(int(content.id))
 
 
-def _xyz(point: Any) -> tuple[float, float, float]:
-    return float(point.x), float(point.y), float(point.z)
-
-
-def _all_xyz(points: Sequence[Any]) -> Float[np.ndarray, 'n 3']:
-    return np.array([_xyz(point) for point in points], dtype=np.float64).reshape(-1, 3)
+def _add_mesh(frame: RecordedFrame, marker: Any, corners: Float[np.ndarray, 'n 3']) -> None:
+    if marker.action == ADD:
+        frame.triangles.append(corners)
+        frame.ids.append(int(marker.id))

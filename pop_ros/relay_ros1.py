@@ -23,10 +23,10 @@ from rclpy.node import Node
 
 from pop_core.errors import PopError
 from pop_ros import relay_ros1_side
-from pop_ros.bag_writer import ROS1_STORE, cdr_to_ros1
 from pop_ros.body_messages import CLOUD, JOINTS, MESH, RECORDED_TYPES
 from pop_ros.qos import output_qos
 from pop_ros.replay import KINDS
+from pop_ros.ros1_conversion import ROS1_STORE, cdr_to_ros1
 
 RELAYED = (MESH, JOINTS, CLOUD)
 READY_S = 15.0
