@@ -4,8 +4,8 @@
 #   make test         the whole test suite
 #   make check        ruff and mypy
 #   make bench-gate   accuracy and speed on a few scenes against the committed baseline
-#   make messages     the ROS messages of msg_defs, and tf2_msgs for tests, without ROS (needs g++
-#                     and python3-dev)
+#   make messages     the ROS messages of msg_defs, and those of other packages that tests need,
+#                     without ROS (needs g++ and python3-dev)
 #   make docs         write the generated pages of docs/ anew
 #
 # Needs Python 3.10 to 3.13 with venv, and make. Choose another Python with PYTHON=, another place
@@ -16,6 +16,7 @@ VENV ?= .venv
 DEMO ?= demo_output
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
+TEST_MESSAGES := tf2_msgs hri_msgs zed_msgs vision_msgs yolo_msgs
 SOURCES := $(shell find pop_core pop_ros -type f -not -name '*.pyc') setup.py package.xml
 
 .PHONY: demo test check bench-gate messages docs pictures clean
@@ -36,10 +37,9 @@ bench-gate: $(VENV)/.tools
 
 messages: $(BIN)/python
 	scripts/build_messages.sh build/pop_msgs $(BIN)/python
-	POP_MESSAGE_TOOLS=$(abspath build/pop_msgs/tools) \
-	  scripts/build_messages.sh build/tf2_msgs $(BIN)/python test/support/tf2_msgs
-	POP_MESSAGE_TOOLS=$(abspath build/pop_msgs/tools) \
-	  scripts/build_messages.sh build/tf2_msgs $(BIN)/python test/support/tf2_msgs
+	set -e; for package in $(TEST_MESSAGES); do \
+	  POP_MESSAGE_TOOLS=$(abspath build/pop_msgs/tools) \
+	    scripts/build_messages.sh build/$$package $(BIN)/python test/support/$$package; done
 
 docs: $(VENV)/.tools
 	$(BIN)/python -m scripts.write_docs
