@@ -19,7 +19,8 @@ FLOOR_M = 0.02  # shoes begin above this
 ALIKE_COS = 0.85
 NARROWINGS = (1.0, 0.6, 0.4)  # of the inlier band, refinement by refinement
 MIN_SHARE = 0.02  # of all measured points
-MAX_BELOW = 0.02  # share of points that may lie below a floor: mirrors, noise
+MAX_BELOW = 0.005  # share of points that may lie below a floor: mirrors, noise
+LOOSE_BELOW = 0.02  # the same for a proposal, whose normal is one noisy pixel's
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,17 +57,16 @@ class Ground:
 def find_ground(frame: RgbdFrame, tries: int = 60) -> Ground | None:
     """Return the floor, or None when no large upward plane has nothing below it.
 
-    Every candidate plane is one measured point with its own normal; the one with the most points
-    on it and almost none below it is refined by least squares. Tables lose because the floor
-    lies below them.
+    Every candidate plane is one measured point with its own normal. The one with the most points
+    on it is refined by least squares and must then have almost nothing below it: seats and tables
+    fail because a floor or the foot of a wall lies below them, and the next candidate is tried.
 
     Args:
         frame: An undistorted frame.
         tries: How many points, evenly over the upward ones, propose a plane.
     """
     points, normals = _points_and_normals(frame.depth_m, frame.camera)
-    # Camera y points down, so a floor's normal has negative y; cameras pitch more than they roll.
-    upward = np.flatnonzero((normals[:, 1] < -TILT_COS) & (np.abs(normals[:, 0]) < ROLL_SIN))
+    upward = np.flatnonzero(_upward(normals))
     if len(upward) < MIN_SHARE * len(points) or len(points) < 50:
         return None
     proposals = upward[:: max(1, len(upward) // tries)]
@@ -75,16 +75,38 @@ def find_ground(frame: RgbdFrame, tries: int = 60) -> Ground | None:
     # Depth noise grows with distance, and so does the width of a plane.
     width = INLIER_M + 0.004 * points[:, 2:] ** 2
     support = (np.abs(height) < width).mean(axis=0)
-    below = (height < -3 * width).mean(axis=0)
-    support[below > MAX_BELOW] = 0.0
-    best = int(np.argmax(support))
-    if support[best] < MIN_SHARE:
-        return None
-    ground = Ground(normal[best], float(-normal[best] @ on_plane[best]))
+    support[(height < -3 * width).mean(axis=0) > LOOSE_BELOW] = 0.0
+    while support.max() >= MIN_SHARE:
+        best = int(np.argmax(support))
+        ground = _settled(normal[best], on_plane[best], points, normals, width[:, 0])
+        below = np.mean(ground.height(points) < -width[:, 0])
+        if below <= MAX_BELOW and _upward(ground.normal):
+            return ground
+        # A seat or a table with floor beside it: none of its points proposes a better plane.
+        support[np.abs(ground.height(on_plane)) < width[proposals, 0]] = 0.0
+        support[best] = 0.0
+    return None
+
+
+def _upward(normal: Float[np.ndarray, '*n 3']) -> Bool[np.ndarray, '*n']:
+    """Return whether normals may be a floor's: cameras pitch more than they roll."""
+    # Camera y points down, so a floor's normal has negative y.
+    return np.asarray((normal[..., 1] < -TILT_COS) & (np.abs(normal[..., 0]) < ROLL_SIN))
+
+
+def _settled(
+    normal: Float[np.ndarray, '3'],
+    on_plane: Float[np.ndarray, '3'],
+    points: Float[np.ndarray, 'n 3'],
+    normals: Float[np.ndarray, 'n 3'],
+    width: Float[np.ndarray, 'n'],
+) -> Ground:
+    """Return a proposal after it settled on the points near it that face its way."""
+    ground = Ground(normal, float(-normal @ on_plane))
     for narrowing in NARROWINGS:
         # Points of a wall's foot lie near the floor too, but face another way.
         alike = normals @ ground.normal > ALIKE_COS
-        ground = _refine(ground, points[alike], narrowing * width[alike, 0])
+        ground = _refine(ground, points[alike], narrowing * width[alike])
     return ground
 
 

@@ -45,6 +45,13 @@ def test_a_table_above_the_floor_is_not_the_floor() -> None:
     assert found.offset_m == pytest.approx(1.6, abs=0.02)
 
 
+def test_a_seat_with_the_foot_of_a_wall_below_it_is_not_the_floor() -> None:
+    seat, _ = room(0.3, 0.0, 0.6, noise=0.0)
+    depth = np.where(seat < 2.0, seat, np.float32(5.0))
+    assert find_ground(frame(seat)) is not None
+    assert find_ground(frame(depth)) is None
+
+
 def test_a_wall_alone_has_no_floor() -> None:
     assert find_ground(frame(np.full((240, 320), 2.0, dtype=np.float32))) is None
 
