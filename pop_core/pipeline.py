@@ -55,6 +55,21 @@ class Scene:
     taken: Bool[np.ndarray, 'h w']
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PersonFit:
+    """What became of one detection.
+
+    Args:
+        status: Why there is no body, or that there is one.
+        estimate: The body as the pipeline's users get it.
+        fit: The body as the fit left it.
+    """
+
+    status: EstimateStatus
+    estimate: BodyEstimate | None = None
+    fit: BodyFit | None = None
+
+
 class BodyPipeline:
     """Finds, fits and segments every person of a frame."""
 
@@ -96,53 +111,54 @@ class BodyPipeline:
     ) -> tuple[list[BodyEstimate], list[EstimateStatus]]:
         """Fit one person after the other, nearest first, each an occluder of the next."""
         with watch.step('lift'):
-            lifted = [self._lift(frame, detection) for detection in detections]
+            lifted = [self.lift(frame, detection) for detection in detections]
         distance_m = [joints.distance_m for joints in lifted]
         with watch.step('ground'):
             ground = find_ground(frame) if self.config.use_ground else None
-        statuses = [self._admit(joints) for joints in lifted]
+        statuses = [self.admit(joints) for joints in lifted]
         scene = Scene(frame, ground, np.zeros(frame.depth_m.shape, dtype=bool))
         bodies: list[BodyEstimate] = []
-        for i in _nearest_first(distance_m, detections):
+        for i in nearest_first(distance_m, detections):
             if statuses[i] is not EstimateStatus.OK or len(bodies) >= self.config.max_people:
                 continue
-            estimate, status = self._fit_person(scene, detections[i], lifted[i], watch)
-            statuses[i] = status
-            if estimate is not None:
-                bodies.append(estimate)
-                scene = replace(scene, taken=scene.taken | estimate.mask)
+            person = self.fit_person(scene, detections[i], lifted[i], watch)
+            statuses[i] = person.status
+            if person.estimate is not None:
+                bodies.append(person.estimate)
+                scene = replace(scene, taken=scene.taken | person.estimate.mask)
         return bodies, statuses
 
-    def _fit_person(
+    def fit_person(
         self,
         scene: Scene,
         detection: Detection,
         lifted: LiftedJoints,
         watch: Stopwatch,
-    ) -> tuple[BodyEstimate | None, EstimateStatus]:
+    ) -> PersonFit:
         """Lift what nearer people left, then retrieve, fit and segment one person."""
         if covers_keypoints(scene.taken, detection):
             with watch.step('lift'):
-                lifted = self._lift(without_depth(scene.frame, scene.taken), detection)
-            status = self._admit(lifted)
+                lifted = self.lift(without_depth(scene.frame, scene.taken), detection)
+            status = self.admit(lifted)
             if status is not EstimateStatus.OK:
-                return None, status
+                return PersonFit(status)
         with watch.step('observe'):
             observation = observe(
                 scene.frame, lifted, scene.taken, scene.ground, detection.part_labels)
         with watch.step('retrieve'):
             candidates = self._retrieve(lifted, observation, scene.frame.camera)
         if not candidates or candidates[0].residual_m > self.config.max_residual_m:
-            return None, EstimateStatus.NO_SKELETON
+            return PersonFit(EstimateStatus.NO_SKELETON)
         with watch.step('fit'):
             fit = self.fitter.fit(observation, candidates)
         with watch.step('segment'):
             estimate, support = self._estimate(scene, fit, lifted)
         if support < self.config.min_support:
-            return None, EstimateStatus.NO_SUPPORT
-        return estimate, EstimateStatus.OK
+            return PersonFit(EstimateStatus.NO_SUPPORT)
+        return PersonFit(EstimateStatus.OK, estimate, fit)
 
-    def _lift(self, frame: RgbdFrame, detection: Detection) -> LiftedJoints:
+    def lift(self, frame: RgbdFrame, detection: Detection) -> LiftedJoints:
+        """Return the joints of a detection in 3D, without those that no pose explains."""
         lifted = lift_keypoints(frame, detection, self.config.lifting)
         return reject_outliers(self.library, lifted, self.config.retrieval)
 
@@ -189,7 +205,8 @@ class BodyPipeline:
         )
         return estimate, support
 
-    def _admit(self, lifted: LiftedJoints) -> EstimateStatus:
+    def admit(self, lifted: LiftedJoints) -> EstimateStatus:
+        """Return OK for joints that a body can be fitted to, or why it cannot."""
         if int(lifted.lifted.sum()) < self.config.min_joints:
             return EstimateStatus.TOO_FEW_JOINTS
         if lifted.extent_m < SMALLEST_EXTENT_M:
@@ -212,7 +229,7 @@ def without_depth(frame: RgbdFrame, taken: Bool[np.ndarray, 'h w']) -> RgbdFrame
     return replace(frame, depth_m=depth_m)
 
 
-def _nearest_first(
+def nearest_first(
     distance_m: Sequence[float], detections: Sequence[Detection]
 ) -> Int[np.ndarray, 'n']:
     """Return the order of people: nearest first, and of two in one place the better seen."""
