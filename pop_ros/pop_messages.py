@@ -13,6 +13,7 @@ from std_msgs.msg import Header
 
 from pop_core.body.joints import JOINT_NAMES
 from pop_core.body.model import BodyModel, BodyParameters
+from pop_core.body.model_digest import model_digest
 from pop_core.estimate import BodyEstimate, JointState
 from pop_ros.to_messages import body_poses
 
@@ -40,7 +41,8 @@ def bodies_message(
 def model_message(model: BodyModel, header: Header) -> Any:
     """Return the pop_msgs/BodyModel whose poses the bodies are."""
     return pop_msgs.BodyModel(
-        header=header, name=model.name, joint_names=list(JOINT_NAMES),
+        header=header, name=model.name, digest=model_digest(model),
+        joint_names=list(JOINT_NAMES),
         parents=model.parents.tolist(), vertex_count=len(model.v_template),
         faces=model.f.astype(np.uint32).ravel())
 
@@ -59,9 +61,22 @@ def definition_files() -> list[Path]:
     return sorted((Path(get_package_share_directory('pop_msgs')) / 'msg').glob('*.msg'))
 
 
+def parameters_of(message: Any) -> BodyParameters:
+    """Return the parameters of a pop_msgs/BodyParameters."""
+    return BodyParameters(
+        transl=np.array(message.transl, np.float64),
+        global_orient=np.array(message.global_orient, np.float64),
+        body_pose=np.array(message.body_pose, np.float64).reshape(23, 3),
+        betas=np.array(message.betas, np.float64), scale=float(message.scale))
+
+
 def _body(body: BodyEstimate, person_id: int) -> Any:
+    track = body.track
     return pop_msgs.Body(
         id=person_id, score=body.score,
+        track_state=pop_msgs.Body.NOT_TRACKED if track is None else int(track.state),
+        age_s=0.0 if track is None else track.age_s,
+        unseen_s=0.0 if track is None else track.unseen_s,
         visible_fraction=float(np.mean(body.joint_state == JointState.VISIBLE)),
         parameters=_parameters(body.parameters), joints=_joints(body),
         energy_names=list(body.energies), energies=list(body.energies.values()))
