@@ -12,13 +12,13 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from pop_core.body.model import BodyModel
-from pop_core.estimate import BodyEstimate, FrameResult
+from pop_core.estimate import FrameResult
 from pop_core.rendering.overlay import draw_people
 from pop_core.rendering.shown_body import shown
 from pop_core.rgbd import RgbdFrame, undistort_frame
 from pop_ros import pop_messages, to_messages
-from pop_ros.cdr import MarkerTemplate
 from pop_ros.image_messages import color_message
+from pop_ros.mesh_markers import MeshMarkers
 from pop_ros.node_config import NodeConfig
 from pop_ros.person_ids import PersonIds
 from pop_ros.skeleton_markers import skeleton_message
@@ -33,7 +33,6 @@ if pop_messages.pop_msgs is not None:
 OUTPUT_TYPES: dict[str, Any] = {**RECORDED_TYPES, SKELETON: MarkerArray, OVERLAY: Image}
 if tf2_msgs is not None:
     OUTPUT_TYPES[TF] = tf2_msgs.TFMessage
-MAX_TEMPLATES = 64  # ids never return; templates of people who left are of no use
 
 # A topic's name without the node's, and a message or its serialised bytes.
 Output = tuple[str, Any]
@@ -47,12 +46,12 @@ class BodyMessages:
         self._model, self._config = model, config
         self._ids = PersonIds()
         self._shown: set[int] = set()
-        self._templates: dict[tuple[int, str], MarkerTemplate] = {}
+        self._meshes = MeshMarkers(model, config.mesh)
 
     def configure(self, config: NodeConfig) -> None:
         """Take over changed settings; ids stay."""
         self._config = config
-        self._templates.clear()
+        self._meshes.configure(config.mesh)
 
     def reset(self) -> None:
         """Start ids anew; markers of ids that are not given again are removed."""
@@ -75,7 +74,9 @@ class BodyMessages:
         if not bodies and not gone:
             return picture
         makers: dict[str, Callable[[], list[Any]]] = {
-            MESH: lambda: self._meshes(result, ids, gone, frame.stamp_ns, frame_id),
+            MESH: lambda: self._meshes.build(
+                {number: body.vertices for number, body in zip(ids, bodies, strict=True)},
+                gone, frame.stamp_ns, frame_id),
             JOINTS: lambda: [to_messages.joints_message(bodies, header)],
             CLOUD: lambda: [to_messages.cloud_message(frame, bodies, ids, header)],
             BODIES: lambda: [pop_messages.bodies_message(bodies, ids, header)],
@@ -90,30 +91,3 @@ class BodyMessages:
         seen = undistort_frame(frame)
         people = [shown(body) for body in result.bodies]
         return color_message(draw_people(seen.rgb, people, self._model.f, seen.camera), header)
-
-    def _meshes(
-        self, result: FrameResult, ids: list[int], gone: set[int], stamp_ns: int, frame_id: str
-    ) -> list[Any]:
-        messages: list[Any] = [
-            to_messages.delete_marker(number, stamp_ns, frame_id) for number in sorted(gone)]
-        if self._config.mesh.detail == 'off':
-            return messages
-        for body, number in zip(result.bodies, ids, strict=True):
-            template = self._template(number, frame_id)
-            messages.append(template.message(stamp_ns, self._triangles(body)))
-        return messages
-
-    def _triangles(self, body: BodyEstimate) -> np.ndarray:
-        if self._config.mesh.detail == 'reduced':
-            coarse = body.vertices[self._model.fit_vertices]
-            return to_messages.triangle_points(coarse, self._model.fit_faces)
-        return to_messages.triangle_points(body.vertices, self._model.f)
-
-    def _template(self, person_id: int, frame_id: str) -> MarkerTemplate:
-        key = (person_id, frame_id)
-        if key not in self._templates:
-            if len(self._templates) >= MAX_TEMPLATES:
-                self._templates.clear()
-            marker = to_messages.mesh_marker(person_id, frame_id, self._config.mesh.lifetime_s)
-            self._templates[key] = MarkerTemplate(marker)
-        return self._templates[key]
