@@ -63,7 +63,7 @@ class BagMessage:
 
 
 class BagReader:
-    """An open bag; `damage` says what was wrong with it once it has been read."""
+    """An open bag."""
 
     def __init__(self, path: Path) -> None:
         """Name a bag: a file, or the folder of a rosbag2.
@@ -73,7 +73,7 @@ class BagReader:
         """
         self.path = path
         self.files = _files(path)
-        self.damage = ''
+        self._damage = ''
         self.topics: list[BagTopic] = []
         self._reader: AnyReader | None = None
 
@@ -89,7 +89,7 @@ class BagReader:
             reader = AnyReader(self.files, default_typestore=STORE)
             reader.open()
         except Exception as error:  # noqa: BLE001 - rosbags passes on what its storages raise
-            self.damage = f'{error}'.rstrip('.') or type(error).__name__
+            self._damage = f'{error}'.rstrip('.') or type(error).__name__
             self.topics = self._salvaged_topics()
         else:
             self._reader = reader
@@ -108,18 +108,52 @@ class BagReader:
             self._reader.close()
             self._reader = None
 
-    def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
-        """Yield the messages of some topics in order of time, up to the damage if there is any."""
+    @property
+    def name(self) -> str:
+        """Return its path."""
+        return str(self.path)
+
+    @property
+    def damage(self) -> str:
+        """Return what was wrong with it, as far as it has been read."""
+        return self._damage
+
+    def messages(
+        self, topics: Collection[str], start_ns: int | None = None, stop_ns: int | None = None
+    ) -> Iterator[BagMessage]:
+        """Yield the messages of some topics in order of time, up to the damage if there is any.
+
+        Args:
+            topics: Their names.
+            start_ns: Earliest time of recording [ns], or None for all.
+            stop_ns: Time of recording before which it ends [ns], or None for all.
+        """
         if self._reader is None:
-            yield from self._salvaged(topics)
+            yield from _within(self._salvaged(topics), start_ns, stop_ns)
             return
         connections = [c for c in self._reader.connections if c.topic in topics]
+        if not connections:  # rosbags would take none for all
+            return
         try:
-            for connection, time_ns, raw in self._reader.messages(connections):
+            for connection, time_ns, raw in self._reader.messages(
+                    connections, start=start_ns, stop=stop_ns):
                 data = _as_cdr(raw, connection.msgtype, is_ros2=self._reader.is2)
                 yield BagMessage(connection.topic, connection.msgtype, time_ns, data)
         except Exception as error:  # noqa: BLE001 - rosbags passes on what its storages raise
-            self.damage = f'{error}'.rstrip('.') or type(error).__name__
+            self._damage = f'{error}'.rstrip('.') or type(error).__name__
+
+    def first(self, topic: str) -> BagMessage | None:
+        """Return the first message of a topic."""
+        return next(iter(self.messages([topic])), None)
+
+    def span_ns(self) -> tuple[int, int] | None:
+        """Return the times of the first and the last message [ns], None without any."""
+        if self._reader is not None:
+            empty = not self._reader.message_count
+            # rosbags ends a bag one nanosecond after its last message.
+            return None if empty else (self._reader.start_time, self._reader.end_time - 1)
+        times = [m.time_ns for path in self._storage_files() for m in salvage(path)]
+        return (min(times), max(times)) if times else None
 
     def _storage_files(self) -> list[Path]:
         return _storages(self.path) if self.path.is_dir() else [self.path]
@@ -131,7 +165,7 @@ class BagReader:
         if not counts:
             raise BagError(
                 f'{self.path}: expected a bag ({", ".join(SUFFIXES)} or a rosbag2 folder), found '
-                f'no message that can be read ({self.damage})')
+                f'no message that can be read ({self._damage})')
         return [BagTopic(*key, count) for key, count in sorted(counts.items())]
 
     def _salvaged(self, topics: Collection[str]) -> Iterator[BagMessage]:
@@ -148,6 +182,15 @@ class BagReader:
 
 def _as_cdr(raw: bytes | memoryview, kind: str, *, is_ros2: bool) -> bytes:
     return bytes(raw) if is_ros2 else ros1_to_cdr(bytes(raw), kind)
+
+
+def _within(
+    messages: Iterator[BagMessage], start_ns: int | None, stop_ns: int | None
+) -> Iterator[BagMessage]:
+    for message in messages:
+        late = start_ns is None or message.time_ns >= start_ns
+        if late and (stop_ns is None or message.time_ns < stop_ns):
+            yield message
 
 
 def _files(path: Path) -> list[Path]:

@@ -6,9 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
-from pop_ros.bag_reader import BagError, BagReader, BagTopic
+from pop_ros.bag_reader import BagError, BagTopic
 from pop_ros.compressed import CompressedLike, is_compressed, is_compressed_depth
 from pop_ros.from_messages import COLOR_CHANNELS, DEPTH_TYPES
+from pop_ros.recording import Recording
 
 IMAGE, INFO = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CameraInfo'
 COMPRESSED = 'sensor_msgs/msg/CompressedImage'
@@ -53,7 +54,7 @@ class ImageTopic:
 
 
 def find_topics(
-    bag: BagReader, color: str | None = None, depth: str | None = None, info: str | None = None
+    bag: Recording, color: str | None = None, depth: str | None = None, info: str | None = None
 ) -> RgbdTopics:
     """Return the RGB-D topics of a bag; named ones are taken as they are.
 
@@ -63,7 +64,7 @@ def find_topics(
     known = {topic.name: topic for topic in bag.topics}
     for name in filter(None, (color, depth, info)):
         if name not in known:
-            raise BagError(f'{bag.path}: expected topic {name}, found {_listing(bag.topics)}')
+            raise BagError(f'{bag.name}: expected topic {name}, found {_listing(bag.topics)}')
     images = list(_image_topics(bag))
     infos = [topic.name for topic in bag.topics if topic.kind == INFO]
     found_color = color or choose_color(images, infos)
@@ -73,7 +74,7 @@ def find_topics(
         roles = {'color image': found_color, 'depth image': found_depth, 'camera_info': found_info}
         missing = ' and '.join(name for name, topic in roles.items() if not topic)
         raise BagError(
-            f'{bag.path}: expected an RGB-D camera, found no {missing} in '
+            f'{bag.name}: expected an RGB-D camera, found no {missing} in '
             f'{_listing(bag.topics)}; name topics with --color, --depth and --info')
     return RgbdTopics(found_color, found_depth, found_info)
 
@@ -115,11 +116,11 @@ def choose_info(color: str, infos: Sequence[str]) -> str | None:
     return max(fitting or infos, key=shared, default=None)
 
 
-def _image_topics(bag: BagReader) -> Iterable[ImageTopic]:
+def _image_topics(bag: Recording) -> Iterable[ImageTopic]:
     for topic in bag.topics:
         if topic.kind not in {IMAGE, COMPRESSED}:
             continue
-        first = next(iter(bag.messages([topic.name])), None)
+        first = bag.first(topic.name)
         if first is not None:
             message = first.read()
             encoding = compressed_encoding(message) if is_compressed(message) else message.encoding

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from rclpy.serialization import serialize_message
 
 from pop_core.errors import PopError
-from pop_ros.bag_reader import BagMessage, BagReader
+from pop_ros.bag_reader import BagMessage
 from pop_ros.bag_topics import RgbdTopics
 from pop_ros.bag_writer import BagWriter
 from pop_ros.body_messages import RECORDED_TYPES
@@ -20,6 +20,7 @@ from pop_ros.frame_fitter import FrameFitter
 from pop_ros.from_messages import stamp_ns
 from pop_ros.pairing import FramePairer
 from pop_ros.plain_cdr import with_zero_padding
+from pop_ros.recording import Recording
 from pop_ros.statistics import drop_reason
 
 OUTPUT_NAMESPACE = '/pop'
@@ -83,11 +84,11 @@ class BagFrame:
 
 
 def paired_frames(
-    bag: BagReader, topics: RgbdTopics, pairer: FramePairer[BagMessage],
+    bag: Recording, topics: RgbdTopics, pairer: FramePairer[BagMessage],
     on_message: Callable[[], None],
 ) -> Iterator[BagFrame]:
     """Yield the frames of a bag in the order their pairs are complete."""
-    info = next(iter(bag.messages([topics.info])), None)
+    info = bag.first(topics.info)
     if info is None:
         return
     for message in bag.messages(topics.all):
@@ -104,7 +105,7 @@ def paired_frames(
 
 
 def replay_every_frame(
-    bag: BagReader,
+    bag: Recording,
     topics: RgbdTopics,
     fitter: FrameFitter,
     writer: BagWriter,
@@ -144,7 +145,7 @@ def replay_every_frame(
     return summary
 
 
-def notes(bag: BagReader, pairer: FramePairer[BagMessage]) -> list[str]:
+def notes(bag: Recording, pairer: FramePairer[BagMessage]) -> list[str]:
     """Return what the user must know about pairs that were refused and damage of the bag."""
     found = []
     if pairer.statistics.missed:

@@ -1,0 +1,106 @@
+"""Several bags read like the one they are parts of, from a start for a duration."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.bags import CAMERA, COLOR, DEPTH, Entry, rgbd_entries, write_bag
+from support.messages import camera_info, depth_image, image
+
+from pop_core.geometry.camera import Camera
+from pop_ros.bag_merge import BagPart, MergedBags
+from pop_ros.bag_reader import BagError
+from pop_ros.bag_topics import find_topics
+
+SUFFIXES = ('.bag', '.db3', '.mcap')
+CAM = Camera(16, 12, 20.0, 20.0, 7.5, 5.5)
+START_NS, STEP_NS = 1_700_000_000_000_000_000, 100_000_000
+ALL = (COLOR, DEPTH, CAMERA)
+
+
+def entries(count: int) -> list[Entry]:
+    """Return frames ten times a second; the CameraInfo comes with the first only."""
+    rng = np.random.default_rng(4)
+    frames = []
+    for stamp in range(START_NS, START_NS + count * STEP_NS, STEP_NS):
+        rgb = rng.integers(0, 256, (12, 16, 3), dtype=np.uint8)
+        depth_m = rng.integers(500, 4000, (12, 16)).astype(np.float32) / 1000
+        frames.append((stamp, image(rgb, 'rgb8', stamp), depth_image(depth_m, '16UC1', stamp),
+                       camera_info(CAM, stamp)))
+    made = rgbd_entries(frames)
+    return [entry for n, entry in enumerate(made) if entry[0] != CAMERA or not n]
+
+
+def read(*paths: Path, part: BagPart | None = None) -> list[tuple[str, int, bytes]]:
+    with MergedBags(paths, part) as bags:
+        return [(m.topic, m.time_ns, m.data) for m in bags.messages(ALL)]
+
+
+@pytest.mark.parametrize('split', [
+    lambda made: [made[:7], made[7:]],
+    lambda made: [[e for e in made if e[0] == topic] for topic in ALL],
+], ids=['by time', 'by topic'])
+def test_parts_of_every_kind_read_like_the_whole(tmp_path: Path, split: object) -> None:
+    whole = write_bag(tmp_path / 'whole.mcap', entries(5))
+    parts = [write_bag(tmp_path / f'part{n}{suffix}', part)
+             for n, (suffix, part) in enumerate(zip(SUFFIXES, split(entries(5)), strict=False))]
+    # In whatever order they are named.
+    assert read(*parts) == read(*parts[::-1]) == read(whole)
+    with MergedBags(parts) as bags:
+        assert find_topics(bags).all == ALL
+        assert {topic.name: topic.count for topic in bags.topics} == {
+            COLOR: 5, DEPTH: 5, CAMERA: 1}
+
+
+@pytest.mark.parametrize('suffix', SUFFIXES)
+def test_a_part_is_what_lies_between_its_ends(tmp_path: Path, suffix: str) -> None:
+    bag = write_bag(tmp_path / f'a{suffix}', entries(6))
+    whole = read(bag)
+    for start_s, duration_s in ((0.0, None), (0.15, None), (0.2, 0.2), (0.0, 0.35), (0.5, 9.0)):
+        low = START_NS + round(start_s * 1e9)
+        high = low + round(duration_s * 1e9) if duration_s is not None else START_NS * 2
+        assert read(bag, part=BagPart(start_s, duration_s)) == [
+            m for m in whole if low <= m[1] < high]
+
+
+@pytest.mark.parametrize('suffix', SUFFIXES)
+def test_a_camera_info_from_before_the_part_is_still_found(tmp_path: Path, suffix: str) -> None:
+    with MergedBags([write_bag(tmp_path / f'a{suffix}', entries(4))], BagPart(0.25)) as bags:
+        assert CAMERA not in {m.topic for m in bags.messages(ALL)}
+        found = bags.first(CAMERA)
+    assert found is not None
+    assert found.time_ns == START_NS
+
+
+@pytest.mark.parametrize('suffix', SUFFIXES)
+def test_a_start_behind_the_end_says_how_long_the_recording_is(
+    tmp_path: Path, suffix: str
+) -> None:
+    bag = write_bag(tmp_path / f'a{suffix}', entries(4))
+    assert read(bag, part=BagPart(0.3))
+    with pytest.raises(BagError, match=r'within 0\.300 s, found 0\.31 s'):
+        read(bag, part=BagPart(0.31))
+
+
+def test_damage_of_one_bag_is_told_with_its_name_and_the_others_are_read_whole(
+    tmp_path: Path
+) -> None:
+    made = entries(60)
+    first, second = (write_bag(tmp_path / name, part) for name, part in (
+        ('first.bag', made[:60]), ('second.bag', made[60:])))
+    os.truncate(first, first.stat().st_size // 2)
+    with MergedBags([first, second]) as bags:
+        times = [m.time_ns for m in bags.messages(ALL)]
+        assert bags.damage.startswith(f'{first}: ')
+        assert str(second) not in bags.damage
+    assert times == sorted(times)
+    assert len(times) > len(made[60:])
+    assert times[-len(made[60:]):] == [time_ns for _, _, time_ns, _ in made[60:]]
+
+
+def test_a_bag_without_the_chosen_topics_is_named(tmp_path: Path) -> None:
+    made = entries(2)
+    other = write_bag(tmp_path / 'other.mcap', [('/other', *made[1][1:])])
+    with MergedBags([write_bag(tmp_path / 'a.mcap', made), other]) as bags:
+        assert bags.unused(ALL) == [str(other)]
