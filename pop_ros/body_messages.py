@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,25 +12,24 @@ from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from pop_core.body.model import BodyModel
-from pop_core.estimate import FrameResult
+from pop_core.estimate import BodyEstimate, FrameResult
 from pop_core.rendering.overlay import draw_people
 from pop_core.rendering.shown_body import shown
 from pop_core.rgbd import RgbdFrame, undistort_frame
 from pop_ros import pop_messages, to_messages
 from pop_ros.image_messages import color_message
-from pop_ros.mesh_markers import MeshMarkers
 from pop_ros.node_config import NodeConfig
+from pop_ros.people_markers import PeopleMarkers
 from pop_ros.person_ids import PersonIds
-from pop_ros.skeleton_markers import skeleton_message
 from pop_ros.tf_messages import tf2_msgs, transforms_message
 
 MESH, JOINTS, CLOUD, BODIES = 'mesh', 'joints', 'cloud', 'bodies'
-SKELETON, OVERLAY, TF = 'skeleton', 'overlay', 'tf'
+MESH_ARRAY, OVERLAY, TF = 'mesh_array', 'overlay', 'tf'
 # What `pop replay` records; the other outputs are pictures of the same.
 RECORDED_TYPES: dict[str, Any] = {MESH: Marker, JOINTS: PoseArray, CLOUD: PointCloud2}
 if pop_messages.pop_msgs is not None:
     RECORDED_TYPES[BODIES] = pop_messages.pop_msgs.BodyArray
-OUTPUT_TYPES: dict[str, Any] = {**RECORDED_TYPES, SKELETON: MarkerArray, OVERLAY: Image}
+OUTPUT_TYPES: dict[str, Any] = {**RECORDED_TYPES, MESH_ARRAY: MarkerArray, OVERLAY: Image}
 if tf2_msgs is not None:
     OUTPUT_TYPES[TF] = tf2_msgs.TFMessage
 
@@ -45,13 +44,14 @@ class BodyMessages:
         """Prepare messages of a body model's meshes."""
         self._model, self._config = model, config
         self._ids = PersonIds()
-        self._shown: set[int] = set()
-        self._meshes = MeshMarkers(model, config.mesh)
+        self._present: set[int] = set()
+        self._latest: tuple[RgbdFrame, str] | None = None
+        self._markers = PeopleMarkers(model, config.mesh)
 
     def configure(self, config: NodeConfig) -> None:
         """Take over changed settings; ids stay."""
         self._config = config
-        self._meshes.configure(config.mesh)
+        self._markers.configure(config.mesh)
 
     def reset(self) -> None:
         """Start ids anew; markers of ids that are not given again are removed."""
@@ -68,23 +68,39 @@ class BodyMessages:
         """
         bodies = result.bodies
         ids = self._ids.assign(np.array([b.joints[0] for b in bodies]).reshape(-1, 3))
-        gone, self._shown = self._shown - set(ids), set(ids)
+        self._latest = frame, frame_id
         header = to_messages.make_header(frame.stamp_ns, frame_id)
         picture = [(OVERLAY, self._overlay(result, frame, header))] if OVERLAY in wanted else []
-        if not bodies and not gone:
-            return picture
+        self._markers.start_frame(frame.stamp_ns)
+        return picture + self._people(bodies, ids, wanted)
+
+    def clear(self, wanted: Collection[str] = tuple(RECORDED_TYPES)) -> list[Output]:
+        """Return what says that everybody has left, with stamp and frame of the latest image."""
+        return [] if self._latest is None else self._people((), (), wanted)
+
+    def _people(
+        self, bodies: Sequence[BodyEstimate], ids: Sequence[int], wanted: Collection[str]
+    ) -> list[Output]:
+        assert self._latest is not None
+        frame, frame_id = self._latest
+        header = to_messages.make_header(frame.stamp_ns, frame_id)
+        changed = bool(bodies) or bool(self._present)
+        self._present = set(ids)
         makers: dict[str, Callable[[], list[Any]]] = {
-            MESH: lambda: self._meshes.build(
-                {number: body.vertices for number, body in zip(ids, bodies, strict=True)},
-                gone, frame.stamp_ns, frame_id),
-            JOINTS: lambda: [to_messages.joints_message(bodies, header)],
-            CLOUD: lambda: [to_messages.cloud_message(frame, bodies, ids, header)],
-            BODIES: lambda: [pop_messages.bodies_message(bodies, ids, header)],
-            SKELETON: lambda: [skeleton_message(bodies, ids, gone, header)],
-            TF: lambda: [transforms_message(bodies, ids, header, self._config.tf.frames)],
+            MESH: lambda: self._markers.markers(bodies, ids, header),
+            MESH_ARRAY: lambda: self._markers.array(bodies, ids, header),
         }
+        if changed:
+            makers |= {
+                JOINTS: lambda: [to_messages.joints_message(bodies, header)],
+                CLOUD: lambda: [to_messages.cloud_message(frame, bodies, ids, header)],
+                BODIES: lambda: [pop_messages.bodies_message(bodies, ids, header)],
+            }
+        if bodies:
+            makers[TF] = lambda: [
+                transforms_message(bodies, ids, header, self._config.tf.frames)]
         chosen = [(name, make()) for name, make in makers.items() if name in wanted]
-        return picture + [(name, message) for name, made in chosen for message in made]
+        return [(name, message) for name, made in chosen for message in made]
 
     def _overlay(self, result: FrameResult, frame: RgbdFrame, header: Header) -> Image:
         # Meshes are drawn as a pinhole sees them.

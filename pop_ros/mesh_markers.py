@@ -47,10 +47,11 @@ class MeshMarkers:
             return messages
         for number, vertices in meshes.items():
             template = self._template(number, frame_id)
-            messages.append(template.message(stamp_ns, self._triangles(vertices)))
+            messages.append(template.message(stamp_ns, self.triangles(vertices)))
         return messages
 
-    def _triangles(self, vertices: Float[np.ndarray, 'v 3']) -> Float[np.ndarray, 'n 3']:
+    def triangles(self, vertices: Float[np.ndarray, 'v 3']) -> Float[np.ndarray, 'n 3']:
+        """Return three corner points [m] per triangle, of the mesh or of its reduced form."""
         if self._config.detail == 'reduced':
             return triangle_points(vertices[self._model.fit_vertices], self._model.fit_faces)
         return triangle_points(vertices, self._model.f)

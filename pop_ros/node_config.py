@@ -44,6 +44,9 @@ class MeshConfig:
 
     detail: str = setting(
         'full', about='Mesh to publish: full, reduced (fits default shared memory), off.')
+    max_rate_hz: float = setting(
+        0.0, unit='Hz', minimum=0.0, maximum=1000.0,
+        about='Most meshes of a person per second, by the stamps of the images; 0 sends all.')
     lifetime_s: float = setting(
         0.0, unit='s', minimum=0.0, maximum=3600.0,
         about='Time after which rviz removes a mesh that is not renewed; 0 keeps it.')

@@ -1,4 +1,4 @@
-"""Skeletons and ids as visualization_msgs/MarkerArray: hidden joints stand out from seen ones."""
+"""Skeletons and ids as visualization_msgs/Marker: hidden joints stand out from seen ones."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA, Header
-from visualization_msgs.msg import Marker, MarkerArray
+from visualization_msgs.msg import Marker
 
 from pop_core.body.joints import JOINT_INDEX, PARENTS
 from pop_core.estimate import BodyEstimate, JointState
@@ -22,17 +22,18 @@ TEXT = ColorRGBA(r=1.0, g=1.0, b=1.0, a=1.0)
 BONES = [(joint, parent) for joint, parent in enumerate(PARENTS) if parent >= 0]
 
 
-def skeleton_message(
-    bodies: Sequence[BodyEstimate], ids: Sequence[int], gone: Collection[int], header: Header
-) -> MarkerArray:
-    """Return bones and id of every person, and the removal of those who left."""
-    markers = []
-    for number in sorted(gone):
-        markers += [_marker(name, number, header, action=Marker.DELETE)
-                    for name in (BONES_NAMESPACE, ID_NAMESPACE)]
-    for body, number in zip(bodies, ids, strict=True):
-        markers += [_bones(body, number, header), _id(body, number, header)]
-    return MarkerArray(markers=markers)
+def skeleton_markers(
+    bodies: Sequence[BodyEstimate], ids: Sequence[int], header: Header
+) -> list[Marker]:
+    """Return bones and id of every person."""
+    return [marker for body, number in zip(bodies, ids, strict=True)
+            for marker in (_bones(body, number, header), _id(body, number, header))]
+
+
+def skeleton_removals(gone: Collection[int], header: Header) -> list[Marker]:
+    """Return what removes bones and ids of those who left."""
+    return [_marker(name, number, header, action=Marker.DELETE)
+            for number in sorted(gone) for name in (BONES_NAMESPACE, ID_NAMESPACE)]
 
 
 def _bones(body: BodyEstimate, person_id: int, header: Header) -> Marker:

@@ -1,8 +1,12 @@
 """Messages say what the estimates say, with the image's stamp and frame."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from rclpy.serialization import deserialize_message
 from scipy.spatial.transform import Rotation
+from visualization_msgs.msg import Marker, MarkerArray
 
 from pop_core.body.default_body import default_body
 from pop_core.body.joints import JOINT_INDEX
@@ -112,9 +116,8 @@ def test_bones_of_hidden_joints_are_drawn_dark_and_the_id_above_the_head(
 ) -> None:
     person = body(model)
     person.joint_state[JOINT_INDEX['left_knee']] = JointState.SCENE_OCCLUDED
-    messages = BodyMessages(model, NodeConfig())
-    (_, array), = messages.build(result(person), frame, 'optical', ('skeleton',))
-    bones, label = array.markers
+    messages = BodyMessages(model, NodeConfig(mesh=MeshConfig(detail='off')))
+    bones, label = array_of(messages.build(result(person), frame, 'optical', ('mesh_array',)))
     ends = np.array([[p.x, p.y, p.z] for p in bones.points])
     assert len(ends) == 2 * 23 == len(bones.colors)
     knee = np.linalg.norm(ends - person.joints[JOINT_INDEX['left_knee']], axis=1) < 1e-9
@@ -123,8 +126,77 @@ def test_bones_of_hidden_joints_are_drawn_dark_and_the_id_above_the_head(
     assert knee.sum() == 2  # the thigh's end and the shin's
     assert label.text == '0'
     assert label.pose.position.y < person.joints[JOINT_INDEX['head'], 1]
-    (_, gone), = messages.build(result(), frame, 'optical', ('skeleton',))
-    assert [m.action for m in gone.markers] == [2, 2]
+    gone = array_of(messages.build(result(), frame, 'optical', ('mesh_array',)))
+    assert [m.action for m in gone] == [Marker.DELETE, Marker.DELETE]
+    assert messages.build(result(), frame, 'optical', ('mesh_array',)) == []
+
+
+def array_of(outputs: list[tuple[str, object]]) -> list[Marker]:
+    """Return the markers of the only message."""
+    (_, message), = outputs
+    found = deserialize_message(message, MarkerArray) if isinstance(message, bytes) else message
+    return found.markers
+
+
+def test_one_array_draws_what_the_single_markers_draw(
+    model: BodyModel, frame: RgbdFrame
+) -> None:
+    messages = BodyMessages(model, NodeConfig(mesh=MeshConfig(detail='reduced')))
+    outputs = messages.build(
+        result(body(model), body(model, 1.5)), frame, 'optical', ('mesh', 'mesh_array'))
+    single = [deserialize_message(m, Marker) for name, m in outputs if name == 'mesh']
+    array = array_of([output for output in outputs if output[0] == 'mesh_array'])
+    assert [m for m in array if m.ns == 'pop_mesh'] == single
+    assert {(m.ns, m.id) for m in array} == {
+        (name, k) for name in ('pop_mesh', 'pop_skeleton', 'pop_id') for k in (0, 1)}
+    assert {(stamp_ns(m.header), m.header.frame_id) for m in array} == {(STAMP_NS, 'optical')}
+
+
+def test_switching_meshes_off_removes_those_that_are_shown_and_nothing_else(
+    model: BodyModel, frame: RgbdFrame
+) -> None:
+    topics = ('mesh', 'mesh_array')
+    messages = BodyMessages(model, NodeConfig())
+    people = result(body(model), body(model, 1.5))
+    messages.build(people, frame, 'optical', topics)
+    messages.configure(NodeConfig(mesh=MeshConfig(detail='off')))
+    outputs = messages.build(people, frame, 'optical', topics)
+    removed = [(m.action, m.ns, m.id) for name, m in outputs if name == 'mesh']
+    expected = [(Marker.DELETE, 'pop_mesh', 0), (Marker.DELETE, 'pop_mesh', 1)]
+    assert removed == expected
+    array = array_of([output for output in outputs if output[0] == 'mesh_array'])
+    assert [(m.action, m.ns, m.id) for m in array if m.action == Marker.DELETE] == expected
+    assert len(array) == 2 + 4
+    again = messages.build(people, frame, 'optical', topics)
+    assert [name for name, _ in again] == ['mesh_array']
+    assert all(m.action == Marker.ADD for m in array_of(again))
+
+
+def test_meshes_keep_to_their_rate_and_removals_do_not_wait(
+    model: BodyModel, frame: RgbdFrame
+) -> None:
+    messages = BodyMessages(
+        model, NodeConfig(mesh=MeshConfig(detail='reduced', max_rate_hz=10.0)))
+    kinds = []
+    for k, people in enumerate([result(body(model))] * 7 + [result()]):
+        later = replace(frame, stamp_ns=STAMP_NS + k * 1_000_000_000 // 30)
+        found = messages.build(people, later, 'optical', ('mesh', 'joints'))
+        kinds.append([type(m).__name__ for _, m in found])
+    mesh, none, removal = ['bytes', 'PoseArray'], ['PoseArray'], ['Marker', 'PoseArray']
+    assert kinds == [mesh, none, none, mesh, none, none, mesh, removal]
+
+
+def test_clearing_says_that_everybody_has_left(model: BodyModel, frame: RgbdFrame) -> None:
+    messages = BodyMessages(model, NodeConfig())
+    topics = ('mesh', 'joints', 'cloud', 'mesh_array')
+    assert messages.clear(topics) == []
+    messages.build(result(body(model)), frame, 'optical', topics)
+    outputs = dict(messages.clear(topics))
+    assert outputs['mesh'].action == Marker.DELETE
+    assert not outputs['joints'].poses
+    assert outputs['cloud'].width == 0
+    assert stamp_ns(outputs['joints'].header) == STAMP_NS
+    assert messages.clear(topics) == []
 
 
 def test_the_overlay_comes_with_every_frame_and_shows_the_body(
@@ -143,10 +215,10 @@ def test_after_a_reset_ids_start_anew_and_old_ones_are_removed(
     model: BodyModel, frame: RgbdFrame
 ) -> None:
     messages = BodyMessages(model, NodeConfig())
-    messages.build(result(body(model), body(model, 1.5)), frame, 'optical', ())
-    messages.build(result(body(model, 1.5)), frame, 'optical', ())
+    messages.build(result(body(model), body(model, 1.5)), frame, 'optical', ('mesh',))
+    messages.build(result(body(model, 1.5)), frame, 'optical', ('mesh',))
     messages.reset()
-    outputs = messages.build(result(body(model, 1.5)), frame, 'optical', ('mesh', 'skeleton'))
+    outputs = messages.build(result(body(model, 1.5)), frame, 'optical', ('mesh',))
     deleted = [m.id for name, m in outputs if name == 'mesh' and not isinstance(m, bytes)]
     assert deleted == [1]
 
