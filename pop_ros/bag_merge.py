@@ -10,11 +10,14 @@ import heapq
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 
 from pop_ros.bag_reader import BagError, BagMessage, BagReader, BagTopic
+
+INFO = 'sensor_msgs/msg/CameraInfo'
+STATIC_TF = '/tf_static'
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,10 +105,30 @@ class MergedBags:
         return min(found, key=lambda message: message.time_ns, default=None)
 
     def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
-        """Yield the messages of some topics in order of time, up to the damage of each bag."""
+        """Yield the messages of some topics in order of time, up to the damage of each bag.
+
+        What is said once and holds from then on, a CameraInfo or fixed transforms, comes first,
+        if it was said before the part that is read.
+        """
+        yield from self._said_before(topics)
         yield from heapq.merge(
             *(bag.messages(topics, *self._bounds_ns) for bag in self._bags),
             key=lambda message: message.time_ns)
+
+    def _said_before(self, topics: Collection[str]) -> Iterator[BagMessage]:
+        start_ns, _ = self._bounds_ns
+        if start_ns is None:
+            return
+        for topic in self.topics:
+            if topic.name not in topics:
+                continue
+            found: list[BagMessage] = []
+            if topic.name == STATIC_TF:  # every publisher said its own
+                found = [m for bag in self._bags
+                         for m in bag.messages([STATIC_TF], None, start_ns)]
+            elif topic.kind == INFO and (first := self.first(topic.name)) is not None:
+                found = [first]
+            yield from (replace(m, time_ns=start_ns) for m in found if m.time_ns < start_ns)
 
     def unused(self, topics: Collection[str]) -> list[str]:
         """Return the bags that hold none of some topics."""

@@ -16,6 +16,9 @@ from pop_ros.pop_messages import definition_files
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 ROS1_STORE = get_typestore(Stores.ROS1_NOETIC)
+# Debian's ROS 1 has them in a package of its own; rosbags counts them to ROS 2 only.
+ROS1_STORE.register(get_types_from_msg(
+    'geometry_msgs/TransformStamped[] transforms', 'tf2_msgs/msg/TFMessage'))
 for file in definition_files():
     definition = get_types_from_msg(file.read_text(encoding='utf-8'), f'pop_msgs/msg/{file.stem}')
     STORE.register(definition)

@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.bags import CAMERA, COLOR, DEPTH, Entry, rgbd_entries, write_bag
-from support.messages import camera_info, depth_image, image
+from support.messages import TYPES, camera_info, depth_image, header, image
 
 from pop_core.geometry.camera import Camera
-from pop_ros.bag_merge import BagPart, MergedBags
+from pop_ros.bag_merge import STATIC_TF, BagPart, MergedBags
 from pop_ros.bag_reader import BagError
 from pop_ros.bag_topics import find_topics
+from pop_ros.replay_inputs import TRANSFORMS
 
 SUFFIXES = ('.bag', '.db3', '.mcap')
 CAM = Camera(16, 12, 20.0, 20.0, 7.5, 5.5)
@@ -30,6 +31,13 @@ def entries(count: int) -> list[Entry]:
                        camera_info(CAM, stamp)))
     made = rgbd_entries(frames)
     return [entry for n, entry in enumerate(made) if entry[0] != CAMERA or not n]
+
+
+def transforms(child: str) -> object:
+    vector, quaternion = (TYPES[f'geometry_msgs/msg/{name}'] for name in ('Vector3', 'Quaternion'))
+    transform = TYPES['geometry_msgs/msg/Transform'](vector(0, 0, 1), quaternion(0, 0, 0, 1))
+    stamped = TYPES['geometry_msgs/msg/TransformStamped'](header(START_NS), child, transform)
+    return TYPES[TRANSFORMS]([stamped])
 
 
 def read(*paths: Path, part: BagPart | None = None) -> list[tuple[str, int, bytes]]:
@@ -60,17 +68,23 @@ def test_a_part_is_what_lies_between_its_ends(tmp_path: Path, suffix: str) -> No
     for start_s, duration_s in ((0.0, None), (0.15, None), (0.2, 0.2), (0.0, 0.35), (0.5, 9.0)):
         low = START_NS + round(start_s * 1e9)
         high = low + round(duration_s * 1e9) if duration_s is not None else START_NS * 2
-        assert read(bag, part=BagPart(start_s, duration_s)) == [
+        found = read(bag, part=BagPart(start_s, duration_s))
+        assert [m for m in found if m[0] != CAMERA or not start_s] == [
             m for m in whole if low <= m[1] < high]
 
 
 @pytest.mark.parametrize('suffix', SUFFIXES)
-def test_a_camera_info_from_before_the_part_is_still_found(tmp_path: Path, suffix: str) -> None:
-    with MergedBags([write_bag(tmp_path / f'a{suffix}', entries(4))], BagPart(0.25)) as bags:
-        assert CAMERA not in {m.topic for m in bags.messages(ALL)}
-        found = bags.first(CAMERA)
-    assert found is not None
-    assert found.time_ns == START_NS
+def test_what_holds_since_before_the_part_comes_first(tmp_path: Path, suffix: str) -> None:
+    static = [(STATIC_TF, TRANSFORMS, START_NS + n, transforms(f'child_{n}')) for n in range(2)]
+    made = [*static, *entries(4)] if suffix != '.bag' else entries(4)
+    bag = write_bag(tmp_path / f'a{suffix}', made)
+    with MergedBags([bag], BagPart(0.25)) as bags:
+        found = list(bags.messages([*ALL, STATIC_TF]))
+    start_ns = START_NS + 250_000_000
+    expected = [CAMERA] if suffix == '.bag' else [CAMERA, STATIC_TF, STATIC_TF]
+    assert [m.topic for m in found if m.time_ns == start_ns] == expected
+    assert min(m.time_ns for m in found) == start_ns
+    assert [m.topic for m in found[len(expected):]] == [COLOR, DEPTH]
 
 
 @pytest.mark.parametrize('suffix', SUFFIXES)
