@@ -57,6 +57,8 @@ setup(
         'ray': ['ray'],
     },
     entry_points={
-        'console_scripts': ['pop = pop_ros.cli:main', 'pop_node = pop_ros.node:main'],
+        'console_scripts': [
+            'pop = pop_ros.cli:main', 'pop_node = pop_ros.node:main',
+            'pop_viewer = pop_ros.viewer_command:main'],
     },
 )

@@ -51,6 +51,8 @@ COMMANDS = (
     Command('bag', 'pop_ros.bag_commands', 'app', 'Make bags of RGB-D frames on disk.'),
     Command('node', 'pop_ros.node', 'main',
             'Run the ROS 2 node: RGB-D topics in, bodies out.', passes_all=True),
+    Command('viewer', 'pop_ros.viewer_command', 'main',
+            'Show the bodies of a node in rviz on another machine.', passes_all=True),
     Command('relay-ros1', 'pop_ros.relay_ros1_command', 'relay_ros1',
             'Pass the outputs of a running node on to ROS 1.'),
     Command('demo', 'pop_ros.demo_command', 'demo',

@@ -16,11 +16,11 @@ ROOT = Path(__file__).resolve().parents[2]
 class RunningNode:
     """A node process whose output is kept."""
 
-    def __init__(self, *arguments: str) -> None:
+    def __init__(self, *arguments: str, module: str = 'pop_ros.node') -> None:
         env = {**os.environ, 'PYTHONPATH': os.pathsep.join(
             [str(ROOT), *filter(None, [os.environ.get('PYTHONPATH')])])}
         self.process = subprocess.Popen(
-            [sys.executable, '-m', 'pop_ros.node', *arguments], env=env, text=True,
+            [sys.executable, '-m', module, *arguments], env=env, text=True,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
         self._lines: list[str] = []
         self._reader = threading.Thread(target=self._read, daemon=True)
