@@ -15,6 +15,7 @@ from pop_core.body.skinning import vertices
 from pop_core.config import PipelineConfig
 from pop_core.estimate import BodyEstimate, EstimateStatus, FrameResult
 from pop_core.fitting.body_fit import BodyFit, BodyFitter
+from pop_core.fitting.body_window import body_window
 from pop_core.fitting.joint_state import fitted_joint_states
 from pop_core.fitting.observation import Observation, observe
 from pop_core.fitting.plausibility import plausibility
@@ -152,7 +153,7 @@ class BodyPipeline:
         with watch.step('fit'):
             fit = self.fitter.fit(observation, candidates)
         with watch.step('segment'):
-            estimate, support = self._estimate(scene, fit, lifted)
+            estimate, support = self.estimate(scene, fit, plausibility(fit, lifted))
         if support < self.config.min_support:
             return PersonFit(EstimateStatus.NO_SUPPORT)
         return PersonFit(EstimateStatus.OK, estimate, fit)
@@ -179,28 +180,36 @@ class BodyPipeline:
             self.library, lifted, self.config.retrieval, hides=in_the_open_m, gravity=gravity,
             camera=camera)
 
-    def _estimate(
-        self, scene: Scene, fit: BodyFit, lifted: LiftedJoints
+    def estimate(
+        self, scene: Scene, fit: BodyFit, trust: float
     ) -> tuple[BodyEstimate, float]:
-        """Return the result of a fit at the frame's full resolution, and its depth support."""
-        frame, parameters = scene.frame, fit.parameters
+        """Return the result of a fit at the frame's full resolution, and its depth support.
+
+        Args:
+            scene: The frame.
+            fit: The body.
+            trust: Share 0..1 that multiplies the support to the score.
+        """
+        parameters = fit.parameters
         mesh = vertices(self.model, parameters)
-        rendered = render_depth(mesh, self.model.f, frame.camera)
-        own = np.isfinite(frame.depth_m) & ~scene.taken
+        window = body_window(mesh, scene.frame.camera)
+        camera, depth_m = window.camera(scene.frame.camera), window.cut(scene.frame.depth_m)
+        rendered = render_depth(mesh, self.model.f, camera)
+        own = np.isfinite(depth_m) & ~window.cut(scene.taken)
         if scene.ground is not None:
-            own &= ~scene.ground.floor_pixels(frame.depth_m, frame.camera.ray_grid())
-        mask = segment_body(
-            frame.depth_m, rendered, own, frame.camera.fx, self.config.segmentation)
+            own &= ~scene.ground.floor_pixels(depth_m, camera.ray_grid())
+        mask = np.zeros(scene.taken.shape, dtype=bool)
+        window.view(mask)[:] = segment_body(
+            depth_m, rendered, own, camera.fx, self.config.segmentation)
         joints = fit.coarse.joints
-        state = fitted_joint_states(
-            self.model, joints, rendered, frame.depth_m, frame.camera)
-        support = depth_support(frame.depth_m, rendered, own)
+        state = fitted_joint_states(self.model, joints, rendered, depth_m, camera)
+        support = depth_support(depth_m, rendered, own)
         covariance = joint_covariance(
             self.model, parameters, fit.hessian, fit.runners_up, state, support)
         estimate = BodyEstimate(
             parameters=parameters, vertices=mesh, joints=joints,
             joint_rotations=joint_rotations(self.model, parameters), joint_state=state,
-            joint_covariance=covariance, mask=mask, score=support * plausibility(fit, lifted),
+            joint_covariance=covariance, mask=mask, score=support * trust,
             energies=fit.energies, runners_up=fit.runners_up,
         )
         return estimate, support

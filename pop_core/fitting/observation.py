@@ -28,11 +28,14 @@ class Window:
     height: int
     stride: int
 
+    def view(self, image: np.ndarray) -> np.ndarray:
+        """Return the thinned part of an image itself: what is written there, is in the image."""
+        bottom, right = self.top + self.height, self.left + self.width
+        return image[self.top: bottom: self.stride, self.left: right: self.stride]
+
     def cut(self, image: np.ndarray) -> np.ndarray:
         """Return the thinned cut-out of an image."""
-        bottom, right = self.top + self.height, self.left + self.width
-        return np.ascontiguousarray(
-            image[self.top: bottom: self.stride, self.left: right: self.stride])
+        return np.ascontiguousarray(self.view(image))
 
     def camera(self, camera: Camera) -> Camera:
         """Return the pinhole that sees the cut-out."""

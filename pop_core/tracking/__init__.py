@@ -1,0 +1,1 @@
+"""People over time: association, warm starts and the filter behind them."""

@@ -1,0 +1,86 @@
+"""The energy of a tracked body: what the sensor says, priors, and the predicted body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.linalg import cholesky
+
+from pop_core.body.model import BodyParameters
+from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.energy import BodyEnergy, PriorBelief, TermWeights
+from pop_core.fitting.levenberg_marquardt import Residual, assemble
+from pop_core.fitting.observation import Observation
+from pop_core.fitting.residuals import Pairs
+from pop_core.geometry.rotation import left_jacobian_inverse
+from pop_core.retrieval.pose_prior import PosePrior
+from pop_core.tracking.body_filter import FilterState, difference, inverse
+from pop_core.tracking.motion import N_MOVING
+
+
+class Prediction:
+    """A predicted body as residual: whitened distance by the filter's covariance."""
+
+    def __init__(self, state: FilterState) -> None:
+        """Factorise the covariance of a predicted state."""
+        self.parameters: BodyParameters = state.parameters
+        self.information = inverse(state.covariance)
+        self._root = cholesky(self.information, lower=False, check_finite=False)
+
+    def residual(self, state: BodyState, *, jacobian: bool) -> Residual:
+        """Return L'(x - predicted) with L L' the predicted information."""
+        step = difference(state.parameters, self.parameters)
+        r = self._root @ step
+        J = self._root @ _step_jacobian(step) if jacobian else None
+        return Residual(r, J, np.ones(len(r)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curvature:
+    """J'WJ at a fit, split by where it comes from.
+
+    Args:
+        data: What was measured in this frame.
+        prior: What is believed of any body: plausible poses, limits, shape.
+    """
+
+    data: Float[np.ndarray, 'x x']
+    prior: Float[np.ndarray, 'x x']
+
+
+class TrackedEnergy:
+    """Terms of one body in one step: measured, believed of bodies, believed of this body."""
+
+    def __init__(
+        self, state: BodyState, observation: Observation, prior: PosePrior,
+        weights: TermWeights, pairs: Pairs, prediction: Prediction,
+    ) -> None:
+        """Freeze robust weights at `state`."""
+        # The predicted body takes the place of the retrieved pose.
+        belief = PriorBelief(prior, state.parameters.body_pose, np.ones(23))
+        self._energy = BodyEnergy(state, observation, belief, weights, pairs)
+        self._prediction = prediction
+
+    def residuals(self, state: BodyState, jacobian: bool) -> list[Residual]:
+        """Return every block of residuals at a state."""
+        return [
+            *self._energy.residuals(state, jacobian),
+            self._prediction.residual(state, jacobian=jacobian)]
+
+    def curvature(self, state: BodyState) -> tuple[Curvature, list[Residual]]:
+        """Return J'WJ of measurements and priors, and the blocks they were made of."""
+        blocks = self._energy.residuals(state, True)
+        size = state.body.size
+        return Curvature(
+            assemble([*blocks[:2], *blocks[6:]], size).hessian,
+            assemble(blocks[2:6], size).hessian), blocks
+
+
+def _step_jacobian(step: Float[np.ndarray, 'x']) -> Float[np.ndarray, 'x x']:
+    """Return d(difference)/d(increment) at a difference: eye except where rotations turn."""
+    out = np.eye(len(step))
+    for j, block in enumerate(left_jacobian_inverse(step[3:N_MOVING].reshape(-1, 3))):
+        out[3 + 3 * j: 6 + 3 * j, 3 + 3 * j: 6 + 3 * j] = block
+    return out

@@ -1,0 +1,144 @@
+"""A few steps of the fit from a predicted body (steps 6 to 8), with all visibility reasoning."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from pop_core.fitting.body_fit import BodyFitter
+from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.depth_consistency import (
+    HidingPlaces,
+    Sight,
+    Visibility,
+    depth_energy,
+    free_space_pairs,
+    see_body,
+)
+from pop_core.fitting.energy import TermWeights
+from pop_core.fitting.ground_contact import ground_pairs
+from pop_core.fitting.levenberg_marquardt import (
+    FIRST_DAMPING,
+    cost_of,
+    levenberg_marquardt_step,
+)
+from pop_core.fitting.observation import Observation
+from pop_core.fitting.residuals import Pairs, join_pairs
+from pop_core.tracking.body_filter import FilterState
+from pop_core.tracking.tracked_energy import Curvature, Prediction, TrackedEnergy
+
+# The robust kernel from the first to the last step [m]: a prediction is off by little.
+WIDEST_M, NARROWEST_M = 0.07, 0.03
+JOINTS_WEIGHT = 0.3  # of keypoints beside a surface that was followed so far
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """How much of a body the camera sees where it is thought to be.
+
+    Args:
+        seen: Share of the vertices toward the camera that the measured surface agrees with.
+        contradicted: Share of them that the camera saw through.
+    """
+
+    seen: float
+    contradicted: float
+
+
+def sighting(visibility: Visibility) -> Sighting:
+    """Return how much of a body is seen, and how much of it cannot be there."""
+    sight = visibility.sight[visibility.facing]
+    count = max(len(sight), 1)
+    return Sighting(
+        float((sight == Sight.VISIBLE).sum() / count),
+        float((sight == Sight.CONTRADICTED).sum() / count))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WarmFit:
+    """A body followed into a frame.
+
+    Args:
+        state: The body on the coarse mesh.
+        visibility: Sight of the coarse mesh.
+        segment: Pixels of the observation that show the person.
+        curvature: J'WJ of measurements and priors.
+        energies: Final energies by name.
+        sighting: How much of the body is seen.
+    """
+
+    state: BodyState
+    visibility: Visibility
+    segment: Bool[np.ndarray, 'h w']
+    curvature: Curvature
+    energies: dict[str, float]
+    sighting: Sighting
+
+
+class WarmStart:
+    """Follows bodies of one model from predictions."""
+
+    def __init__(self, fitter: BodyFitter) -> None:
+        """Use the terms and settings of a fitter."""
+        self.fitter = fitter
+
+    def fit(
+        self, predicted: FilterState, start: BodyState, observation: Observation, steps: int,
+        *, detected: bool,
+    ) -> WarmFit:
+        """Return the body after some steps.
+
+        Args:
+            predicted: What is believed of the body in this frame, as a residual.
+            start: Where the steps begin, on the coarse mesh.
+            observation: What the sensor says.
+            steps: How many steps.
+            detected: Whether the observation holds keypoints of this frame.
+        """
+        prediction = Prediction(predicted)
+        weights = TermWeights(
+            JOINTS_WEIGHT if detected else 0.0, self.fitter.config.prior_weight, 0.0)
+        state, damping = start, FIRST_DAMPING
+        visibility = see_body(state, observation)
+        segment = self.fitter.steps.segment(visibility, observation)
+        places = HidingPlaces(observation, segment, state.vertices[:, 2])
+        active = np.ones(state.body.size, dtype=bool)
+        for scale_m in np.geomspace(WIDEST_M, NARROWEST_M, steps):
+            pairs = self._pairs(state, observation, visibility, segment, places, float(scale_m))
+            energy = TrackedEnergy(
+                state, observation, self.fitter.prior, weights, pairs, prediction)
+            report = levenberg_marquardt_step(
+                state, energy.residuals, BodyState.moved, active, damping)
+            state, damping = report.state, report.damping
+            visibility = see_body(state, observation)
+        curvature, blocks = energy.curvature(state)
+        segment = self.fitter.steps.segment(visibility, observation)
+        energies = {
+            'E_J3D': cost_of(blocks[:1]), 'E_prior': cost_of(blocks[2:6]),
+            'E_NN': cost_of(blocks[6:]),
+            'E_depth': depth_energy(visibility, observation, segment),
+        }
+        return WarmFit(
+            state, visibility, segment, curvature, energies, sighting(visibility))
+
+    def _pairs(
+        self, state: BodyState, observation: Observation, visibility: Visibility,
+        segment: Bool[np.ndarray, 'h w'], places: HidingPlaces, scale_m: float,
+    ) -> Pairs:
+        parts = [self.fitter.steps.surface_pairs(
+            state, observation, visibility, segment, scale_m)]
+        if self.fitter.config.free_space:
+            parts.append(free_space_pairs(state, visibility, places))
+        if observation.ground is not None:
+            parts.append(ground_pairs(state, observation.ground, observation.lifted))
+        return join_pairs(parts)
+
+
+def mean_distance_m(
+    joints: Float[np.ndarray, '24 3'], others: Sequence[Float[np.ndarray, '24 3']]
+) -> list[float]:
+    """Return the mean distance of joints to the same joints of other bodies [m]."""
+    return [float(np.linalg.norm(joints - other, axis=1).mean()) for other in others]
