@@ -1,20 +1,30 @@
-"""One worker thread that always works on the newest item."""
+"""One worker thread that always works on the newest item, and does tasks in between."""
 
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 ItemT = TypeVar('ItemT')
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """Something to be done once, in the order given, before the next item."""
+
+    run: Callable[[], None]
+
+
 class Mailbox(Generic[ItemT]):
-    """A slot for one item: a newer item replaces one that nobody has taken yet."""
+    """A slot for one item, which a newer one replaces, and a queue of tasks, which all count."""
 
     def __init__(self) -> None:
         self._condition = threading.Condition()
         self._item: ItemT | None = None
+        self._tasks: deque[Task] = deque()
         self._closed = False
 
     def put(self, item: ItemT) -> bool:
@@ -25,15 +35,24 @@ class Mailbox(Generic[ItemT]):
             self._condition.notify()
             return replaced
 
-    def take(self) -> ItemT | None:
-        """Wait for an item and take it; None once the mailbox is closed."""
+    def add(self, task: Task) -> None:
+        """Queue a task."""
         with self._condition:
-            self._condition.wait_for(lambda: self._item is not None or self._closed)
+            self._tasks.append(task)
+            self._condition.notify()
+
+    def take(self) -> ItemT | Task | None:
+        """Wait for a task or an item and take it; None once the mailbox is closed."""
+        with self._condition:
+            self._condition.wait_for(
+                lambda: self._tasks or self._item is not None or self._closed)
+            if self._tasks:
+                return self._tasks.popleft()
             item, self._item = self._item, None
             return None if self._closed else item
 
     def close(self) -> None:
-        """Wake the taker for the last time; an item that waits is dropped."""
+        """Wake the taker for the last time: tasks are still done, an item is dropped."""
         with self._condition:
             self._closed = True
             self._condition.notify_all()
@@ -65,6 +84,10 @@ class Worker(Generic[ItemT]):
         """Start the thread."""
         self._thread.start()
 
+    def call(self, run: Callable[[], None]) -> None:
+        """Have something done in the thread, before the next item."""
+        self.mailbox.add(Task(run))
+
     def stop(self, timeout_s: float) -> bool:
         """Ask the thread to end; return whether it did within `timeout_s`."""
         self.mailbox.close()
@@ -81,6 +104,9 @@ class Worker(Generic[ItemT]):
             return
         while (item := self.mailbox.take()) is not None:
             try:
-                self._process(item)
+                if isinstance(item, Task):
+                    item.run()
+                else:
+                    self._process(item)
             except Exception as error:  # noqa: BLE001 - one bad frame must not end the node
                 self._on_error(error)

@@ -86,3 +86,50 @@ def test_stopping_tells_when_the_work_does_not_end() -> None:
 
 def test_a_worker_that_never_started_stops_at_once() -> None:
     assert Worker(lambda _item: None, lambda _error: None).stop(0)
+
+
+def test_tasks_are_done_in_order_before_the_next_item_and_errors_told() -> None:
+    done: list[object] = []
+    entered, release, finished = threading.Event(), threading.Event(), threading.Event()
+
+    def process(item: int) -> None:
+        entered.set()
+        release.wait(5)
+        done.append(item)
+        if item == 2:
+            finished.set()
+
+    def fail() -> None:
+        raise ValueError('bad task')
+
+    worker = Worker(process, done.append)
+    worker.start()
+    worker.mailbox.put(1)
+    assert entered.wait(5)
+    worker.mailbox.put(2)
+    for task in (lambda: done.append('a'), fail, lambda: done.append('b')):
+        worker.call(task)
+    release.set()
+    assert finished.wait(5)
+    assert [str(entry) for entry in done] == ['1', 'a', 'bad task', 'b', '2']
+    assert worker.stop(5)
+
+
+def test_tasks_given_before_the_end_are_done_and_a_waiting_item_is_not() -> None:
+    done: list[object] = []
+    entered, release = threading.Event(), threading.Event()
+
+    def process(item: int) -> None:
+        done.append(item)
+        entered.set()
+        release.wait(5)
+
+    worker = Worker(process, done.append)
+    worker.start()
+    worker.mailbox.put(1)
+    assert entered.wait(5)
+    worker.mailbox.put(2)
+    worker.call(lambda: done.append('last'))
+    threading.Timer(0.05, release.set).start()
+    assert worker.stop(5)
+    assert done == [1, 'last']
