@@ -29,7 +29,7 @@ def draw_occluders(
     for _ in range(25):
         blocks: tuple[Block, ...] = ()
         for _ in range(rng.integers(config.occluders[0], config.occluders[1] + 1)):
-            thing = _before(actors[int(rng.integers(len(actors)))], eye, rng)
+            thing = before_person(actors[int(rng.integers(len(actors)))], eye, rng)
             blocks = blocks if _touch(blocks, thing) else blocks + thing
         if not is_free(blocks, actors, eye):
             continue
@@ -42,7 +42,7 @@ def draw_occluders(
     return None
 
 
-def _before(
+def before_person(
     victim: Actor, eye: Float[np.ndarray, '3'], rng: np.random.Generator
 ) -> tuple[Block, ...]:
     """Return a piece of furniture on the floor between the eye and a person."""

@@ -55,7 +55,7 @@ def draw_actor(
     for _ in range(20):
         pose = draw_pose(model, kind, rng)
         parameters = BodyParameters(np.zeros(3), pose.tilt, pose.body_pose, betas, scale)
-        actor = _settled(model, pose.kind, parameters, outfit, rng)
+        actor = settled(model, pose.kind, parameters, outfit, rng)
         if actor is not None:
             return actor
     return draw_actor(model, 'standing', rng, child=child, bare=bare)
@@ -89,7 +89,7 @@ def moved_parameters(
     return parameters.replaced(transl=moved_root - root, global_orient=to_rotvec(turned))
 
 
-def _settled(
+def settled(
     model: BodyModel, kind: str, parameters: BodyParameters, outfit: Outfit,
     rng: np.random.Generator,
 ) -> Actor | None:

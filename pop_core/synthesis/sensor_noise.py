@@ -27,14 +27,14 @@ def structured_light(
     eighth of a pixel, a shadow beside near objects where the projector's light does not reach,
     ragged edges.
     """
-    z = _jittered_pixels(_finite(depth_m), 0.5, rng)
-    shadow = _projector_shadow(_finite(depth_m), camera)
+    z = jittered_pixels(_finite(depth_m), 0.5, rng)
+    shadow = projector_shadow(_finite(depth_m), camera)
     z = z + rng.normal(0, 1, z.shape) * (0.0012 + 0.0019 * (z - 0.4) ** 2)
     focal_baseline = camera.fx * BASELINE_M
     disparity = np.round(focal_baseline / z * 8) / 8
     z = focal_baseline / np.maximum(disparity, 0.125)
-    lost = shadow | _grazing(depth_m, 0.12) | (z < 0.45) | (z > 7.0)
-    lost |= dark & (rng.random(z.shape) < 0.15) | _speckle(z.shape, 0.0003, rng)
+    lost = shadow | grazing(depth_m, 0.12) | (z < 0.45) | (z > 7.0)
+    lost |= dark & (rng.random(z.shape) < 0.15) | speckle(z.shape, 0.0003, rng)
     return _with_holes(z, lost)
 
 
@@ -49,12 +49,12 @@ def stereo(
     z = _finite(depth_m)
     window = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
     fattened = cv2.erode(z, window)
-    z = np.where(_blotches(z.shape, 10, rng) > 0.0, fattened, z)
+    z = np.where(blotches(z.shape, 10, rng) > 0.0, fattened, z)
     sigma = 0.08 / (camera.fx * STEREO_BASELINE_M) * z**2  # 0.08 px of disparity
-    z = z + sigma * (0.9 * _blotches(z.shape, 7, rng) + 0.4 * rng.normal(0, 1, z.shape))
+    z = z + sigma * (0.9 * blotches(z.shape, 7, rng) + 0.4 * rng.normal(0, 1, z.shape))
     z = cv2.GaussianBlur(z, (3, 3), 0.8)
-    unmatched = _grazing(depth_m, 0.2) & (rng.random(z.shape) < 0.5)
-    holes = unmatched | (_blotches(z.shape, 14, rng) + 0.5 * _blotches(z.shape, 5, rng) > 2.9)
+    unmatched = grazing(depth_m, 0.2) & (rng.random(z.shape) < 0.5)
+    holes = unmatched | (blotches(z.shape, 14, rng) + 0.5 * blotches(z.shape, 5, rng) > 2.9)
     lost = holes | (z < 0.28) | (z > 9.0) | (dark & (rng.random(z.shape) < 0.05))
     return _with_holes(z, lost)
 
@@ -71,12 +71,12 @@ def time_of_flight(
     mixed = cv2.GaussianBlur(z, (3, 3), 0.7)
     edge = np.abs(mixed - z) > 0.02 * z
     z = np.where(edge & (rng.random(z.shape) < 0.7), mixed, z)
-    multipath = 0.004 * _blotches(z.shape, 60, rng) + 0.002 * z
+    multipath = 0.004 * blotches(z.shape, 60, rng) + 0.002 * z
     z = z + multipath + rng.normal(0, 1, z.shape) * (0.0012 + 0.0006 * z**2)
     weak = dark * np.clip(0.1 * z - 0.15, 0, 0.6)
     lost = (edge & (rng.random(z.shape) < 0.25)) | (rng.random(z.shape) < weak)
     lost |= (z < 0.25) | (z > 5.5 * (camera.fx / camera.width) / 0.78 + 1.0)
-    return _with_holes(z, lost | _grazing(depth_m, 0.08))
+    return _with_holes(z, lost | grazing(depth_m, 0.08))
 
 
 SENSORS: dict[str, Callable[[Depth, Camera, Bool[np.ndarray, 'h w'], np.random.Generator], Depth]]
@@ -94,7 +94,7 @@ def _with_holes(z: Float[np.ndarray, 'h w'], lost: Bool[np.ndarray, 'h w']) -> D
     return np.where(lost, np.nan, z).astype(np.float32)
 
 
-def _jittered_pixels(z: Depth, sigma_px: float, rng: np.random.Generator) -> Depth:
+def jittered_pixels(z: Depth, sigma_px: float, rng: np.random.Generator) -> Depth:
     """Return each pixel's depth read a little beside it: edges become ragged."""
     v, u = np.mgrid[: z.shape[0], : z.shape[1]].astype(np.float32)
     shift = rng.normal(0, sigma_px, (2, *z.shape)).astype(np.float32)
@@ -102,7 +102,7 @@ def _jittered_pixels(z: Depth, sigma_px: float, rng: np.random.Generator) -> Dep
                      borderMode=cv2.BORDER_REPLICATE)
 
 
-def _projector_shadow(z: Depth, camera: Camera) -> Bool[np.ndarray, 'h w']:
+def projector_shadow(z: Depth, camera: Camera) -> Bool[np.ndarray, 'h w']:
     """Return pixels whose surface the projector, to the right of the camera, does not see.
 
     Along a row the projector sees columns u - f b / z; where a nearer surface on the projector's
@@ -115,7 +115,7 @@ def _projector_shadow(z: Depth, camera: Camera) -> Bool[np.ndarray, 'h w']:
     return column > beyond + 1.0
 
 
-def _grazing(depth_m: Depth, least_cosine: float) -> Bool[np.ndarray, 'h w']:
+def grazing(depth_m: Depth, least_cosine: float) -> Bool[np.ndarray, 'h w']:
     """Return pixels whose surface is seen nearly edge-on, from the slope of depth."""
     z = _finite(depth_m)
     slope_u = cv2.Sobel(z, cv2.CV_32F, 1, 0, ksize=3) / 8
@@ -125,7 +125,7 @@ def _grazing(depth_m: Depth, least_cosine: float) -> Bool[np.ndarray, 'h w']:
     return (1.0 / np.sqrt(1.0 + slope**2) < least_cosine) & ~jump
 
 
-def _blotches(
+def blotches(
     shape: tuple[int, ...], size_px: int, rng: np.random.Generator
 ) -> Float[np.ndarray, 'h w']:
     """Return smooth noise of unit variance with spots of about `size_px`."""
@@ -134,8 +134,9 @@ def _blotches(
     return fine / max(float(fine.std()), 1e-6)
 
 
-def _speckle(
+def speckle(
     shape: tuple[int, ...], share: float, rng: np.random.Generator
 ) -> Bool[np.ndarray, 'h w']:
+    """Return spots of 3x3 pixels around a share of all pixels."""
     seeds = (rng.random(shape) < share).astype(np.uint8)
     return cv2.dilate(seeds, np.ones((3, 3), np.uint8)) > 0

@@ -80,19 +80,41 @@ class RenderedTruth:
     part_labels: Int8[np.ndarray, 'h w']
 
 
-def render_truth(model: BodyModel, layout: Layout) -> RenderedTruth:
-    """Return the truth of a layout: each person rendered alone, then against all others."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Background:
+    """Room and blocks of a layout, camera frame, and what the camera sees of them."""
+
+    stage: Stage
+    image: RenderedDepth
+
+
+def background_of(layout: Layout) -> Background:
+    """Return a layout without its people."""
     surfaces = [*room_surfaces(layout.room), *(block_surface(block) for block in layout.blocks)]
     stage = joined([_seen(surface, layout.T_camera_room) for surface in surfaces])
-    background = render_depth(stage.vertices, stage.faces, layout.camera)
+    return Background(stage, render_depth(stage.vertices, stage.faces, layout.camera))
+
+
+def render_truth(
+    model: BodyModel, layout: Layout, behind: Background | None = None
+) -> RenderedTruth:
+    """Return the truth of a layout: each person rendered alone, then against all others.
+
+    Args:
+        model: Body model.
+        layout: Who and what stands where.
+        behind: The same layout's background, where it is known from an earlier frame.
+    """
+    behind = background_of(layout) if behind is None else behind
+    stage, background = behind.stage, behind.image
     clothed = [transform_points(layout.T_camera_room, actor.surface) for actor in layout.actors]
     alone = [render_depth(p, model.f, layout.camera) for p in clothed]
     layers = np.stack([background.depth_m, *(image.depth_m for image in alone)])
     owner = layers.argmin(axis=0)
     faces = np.stack([background.face, *(image.face for image in alone)])
     face = np.take_along_axis(faces, owner[None], axis=0)[0].astype(np.int32)
-    part_of_face = np.append(_part_of_face(model), -1)  # face -1 is no part
-    own_parts = [part_of_face[image.face] for image in alone]
+    of_face = np.append(part_of_face(model), -1)  # face -1 is no part
+    own_parts = [of_face[image.face] for image in alone]
     people = tuple(
         _person(model, layout, k, _Alone(clothed[k], alone[k], own_parts[k]), layers)
         for k in range(len(layout.actors)))
@@ -142,7 +164,7 @@ def _seen(surface: Surface, T_camera_room: Float[np.ndarray, '4 4']) -> Surface:
                    surface.albedo, surface.texture)
 
 
-def _part_of_face(model: BodyModel) -> Int[np.ndarray, 'm']:
+def part_of_face(model: BodyModel) -> Int[np.ndarray, 'm']:
     """Return the joint that moves each triangle most."""
     summed = model.weights[model.f].sum(axis=1)
     return summed.argmax(axis=1)

@@ -1,0 +1,1 @@
+"""Training of the embedded detector of people in depth images (torch, extra `[train]`)."""

@@ -1,0 +1,74 @@
+"""Draw training scenes with all cores and write them as shards."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from pop_core.body.default_body import default_body
+from pop_core.synthesis.coarse_body import coarse_body
+from pop_core.synthesis.training_scenes import TrainingScenes
+from pop_core.training.shards import ShardError, pack, save_shard
+
+SHARD_SCENES = 256
+MARGIN_PX = 16  # scenes are larger than the network's input by this: crops shift them
+
+
+def load_motions(path: Path) -> list[Float[np.ndarray, '23 3']]:
+    """Return the captured poses of an .npz file with `pose` (n, 24, 3), rotation vectors [rad].
+
+    Raises:
+        ShardError: If the file holds no such array.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            pose = arrays['pose'].astype(np.float64)
+    except (OSError, ValueError, KeyError) as error:
+        raise ShardError(f'{path}: expected an array "pose" (n, 24, 3), found: {error}') from None
+    if pose.ndim != 3 or pose.shape[1:] != (24, 3):
+        raise ShardError(f'{path}: expected "pose" (n, 24, 3), found {pose.shape}')
+    return list(pose[:, 1:])
+
+
+def write_shards(
+    folder: Path, count: int, *, seed: int, size: tuple[int, int], focal_px: float,
+    workers: int = 1, mocap: Path | None = None,
+) -> Iterator[int]:
+    """Write at least `count` scenes and yield how many are done after every shard.
+
+    Args:
+        folder: Where `<seed>_<number>.npz` are written.
+        count: Number of scenes, rounded up to whole shards.
+        seed: Decides every scene, whatever the number of workers.
+        size: Width and height of the network's input [px].
+        focal_px: Focal length of the network's input [px].
+        workers: Processes.
+        mocap: File of captured poses to draw from as well.
+    """
+    jobs = [(folder / f'{seed:04d}_{k:05d}.npz', seed * 100_000 + k, size, focal_px, mocap)
+            for k in range(-(-count // SHARD_SCENES))]
+    todo = [job for job in jobs if not job[0].exists()]
+    done = (len(jobs) - len(todo)) * SHARD_SCENES
+    if workers == 1:
+        for job in todo:
+            _write(job)
+            done += SHARD_SCENES
+            yield done
+        return
+    with get_context('spawn').Pool(workers) as pool:
+        for _ in pool.imap_unordered(_write, todo):
+            done += SHARD_SCENES
+            yield done
+
+
+def _write(job: tuple[Path, int, tuple[int, int], float, Path | None]) -> None:
+    path, seed, (width, height), focal_px, mocap = job
+    motions = load_motions(mocap) if mocap is not None else ()
+    scenes = TrainingScenes(
+        coarse_body(default_body()), seed, width=width + MARGIN_PX, height=height + MARGIN_PX,
+        focal_px=focal_px, motions=motions)
+    save_shard(pack([scenes.draw() for _ in range(SHARD_SCENES)]), path)

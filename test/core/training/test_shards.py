@@ -1,0 +1,62 @@
+"""Packed training scenes come back as they were."""
+
+import numpy as np
+import pytest
+
+from pop_core.body.default_body import default_body
+from pop_core.keypoints.body_parts import CLASS_MIRROR, CLASS_OF_LABEL, LABEL_OF_CLASS
+from pop_core.synthesis.coarse_body import coarse_body
+from pop_core.synthesis.training_scenes import TrainingScenes
+from pop_core.training.shards import (
+    OWNER_SHIFT,
+    ShardError,
+    load_shard,
+    pack,
+    save_shard,
+    shard_paths,
+)
+
+
+@pytest.fixture(scope='module')
+def scenes():
+    body = coarse_body(default_body())
+    stream = TrainingScenes(body, seed=1, width=96, height=80, focal_px=80.0)
+    return [stream.draw() for _ in range(6)]
+
+
+def test_a_saved_shard_is_loaded_unchanged(scenes, tmp_path):
+    shard = pack(scenes)
+    save_shard(shard, tmp_path / 'a.npz')
+    loaded = load_shard(shard_paths(tmp_path)[0])
+    for name in ('depth_mm', 'labels', 'points', 'visible', 'lens'):
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(shard, name))
+
+
+def test_labels_tell_part_and_person_apart(scenes):
+    shard = pack(scenes)
+    for row, scene in enumerate(scenes):
+        labels = shard.labels[row]
+        np.testing.assert_array_equal((labels >> OWNER_SHIFT).astype(int) - 1, scene.owner)
+        np.testing.assert_array_equal(labels & 15, CLASS_OF_LABEL[scene.part_labels])
+
+
+def test_depth_is_kept_to_the_millimetre(scenes):
+    shard = pack(scenes)
+    depth_m = np.nan_to_num(np.stack([scene.depth_m for scene in scenes]))
+    np.testing.assert_allclose(shard.depth_mm / 1e3, depth_m, atol=6e-4)
+
+
+def test_classes_and_labels_are_inverse_on_the_parts_that_stand_for_others():
+    np.testing.assert_array_equal(CLASS_OF_LABEL[LABEL_OF_CLASS], np.arange(16))
+    np.testing.assert_array_equal(CLASS_MIRROR[CLASS_MIRROR], np.arange(16))
+
+
+def test_a_damaged_shard_is_told(tmp_path):
+    (tmp_path / 'a.npz').write_bytes(b'no zip')
+    with pytest.raises(ShardError, match='expected packed training scenes'):
+        load_shard(tmp_path / 'a.npz')
+
+
+def test_a_folder_without_scenes_says_how_to_make_some(tmp_path):
+    with pytest.raises(ShardError, match=r'pop_core\.training scenes'):
+        shard_paths(tmp_path)
