@@ -39,6 +39,42 @@ class KeypointNoise:
     guess_factor: float = 3.0
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class KeypointDraws:
+    """The random numbers of one detection: uniform in 0..1 unless called normal.
+
+    Args:
+        guess: Is a hidden point guessed?
+        spread: How far do keypoints spread?
+        offset: Normal; where to, in units of the spread.
+        missing: Is a visible point missed?
+        outlier: Is a visible point put elsewhere?
+        elsewhere: Where, within what is seen of the person.
+        swap: Are left and right taken for each other?
+        high: Normal; score of seen points.
+        low: Normal; score of guessed points.
+    """
+
+    guess: Float[np.ndarray, '15']
+    spread: float
+    offset: Float[np.ndarray, '15 2']
+    missing: Float[np.ndarray, '15']
+    outlier: Float[np.ndarray, '15']
+    elsewhere: Float[np.ndarray, '15 2']
+    swap: float
+    high: Float[np.ndarray, '15']
+    low: Float[np.ndarray, '15']
+
+
+def draw_keypoint_errors(rng: np.random.Generator) -> KeypointDraws:
+    """Return the numbers of one detection, drawn independently."""
+    n = N_SHARED
+    return KeypointDraws(
+        guess=rng.random(n), spread=rng.random(), offset=rng.normal(size=(n, 2)),
+        missing=rng.random(n), outlier=rng.random(n), elsewhere=rng.random((n, 2)),
+        swap=rng.random(), high=rng.normal(size=n), low=rng.normal(size=n))
+
+
 def noisy_detection(
     points_camera: Float[np.ndarray, '15 3'], states: Int[np.ndarray, '15'], camera: Camera,
     rng: np.random.Generator, noise: KeypointNoise,
@@ -52,45 +88,62 @@ def noisy_detection(
         rng: Randomness.
         noise: How the detector errs.
     """
+    return detection_from_draws(
+        points_camera, states, camera, draw_keypoint_errors(rng), noise)
+
+
+def detection_from_draws(
+    points_camera: Float[np.ndarray, '15 3'], states: Int[np.ndarray, '15'], camera: Camera,
+    draws: KeypointDraws, noise: KeypointNoise,
+) -> Detection | None:
+    """Return the detection that given random numbers make of a person, or None.
+
+    Args:
+        points_camera: The shared points, camera frame [m].
+        states: A JointState per point.
+        camera: Camera without distortion.
+        draws: Randomness.
+        noise: How the detector errs.
+    """
     truth_px = np.nan_to_num(camera.project(points_camera), nan=-1e4)
     seen = states == JointState.VISIBLE
-    guessed = _guesses(states, rng, noise)
-    sigma = rng.uniform(*noise.sigma_px) * camera.width / 640
+    guessed = draws.guess < _chance_of_guess(states, noise)
+    low_px, high_px = noise.sigma_px
+    sigma = (low_px + (high_px - low_px) * draws.spread) * camera.width / 640
     spread = np.where(guessed, sigma * noise.guess_factor, sigma)[:, None]
-    keypoints = truth_px + rng.normal(size=(N_SHARED, 2)) * spread
-    found = (seen & (rng.random(N_SHARED) >= noise.missing)) | guessed
-    keypoints = _with_outliers(keypoints, truth_px[seen], found & seen, rng, noise.outliers)
-    if rng.random() < noise.swaps:
+    keypoints = truth_px + draws.offset * spread
+    found = (seen & (draws.missing >= noise.missing)) | guessed
+    wrong = found & seen & (draws.outlier < noise.outliers)
+    keypoints = _with_outliers(keypoints, truth_px[seen], wrong, draws.elsewhere)
+    if draws.swap < noise.swaps:
         keypoints, found = keypoints[SHARED_MIRROR], found[SHARED_MIRROR]
     found &= _inside(keypoints, camera)
     if found.sum() < MIN_KEYPOINTS:
         return None
-    high = np.clip(rng.normal(0.82, 0.08, N_SHARED), 0.3, 0.98)
-    low = np.clip(rng.normal(0.35, 0.12, N_SHARED), 0.06, 0.7)
+    high = np.clip(0.82 + 0.08 * draws.high, 0.3, 0.98)
+    low = np.clip(0.35 + 0.12 * draws.low, 0.06, 0.7)
     scores = np.where(found, np.where(guessed, low, high), 0.0)
     return detection_of(keypoints, scores)
 
 
-def _guesses(
-    states: Int[np.ndarray, '15'], rng: np.random.Generator, noise: KeypointNoise
-) -> Bool[np.ndarray, '15']:
-    """Return which hidden points the detector puts somewhere all the same."""
-    chance = np.select(
+def _chance_of_guess(
+    states: Int[np.ndarray, '15'], noise: KeypointNoise
+) -> Float[np.ndarray, '15']:
+    """Return how often the detector puts each hidden point somewhere all the same."""
+    return np.select(
         [states == JointState.SELF_OCCLUDED, states == JointState.SCENE_OCCLUDED],
         [noise.hidden_by_self, noise.hidden_by_scene], 0.0)
-    return rng.random(N_SHARED) < chance
 
 
 def _with_outliers(
     keypoints: Float[np.ndarray, '15 2'], on_person: Float[np.ndarray, 'n 2'],
-    candidates: Bool[np.ndarray, '15'], rng: np.random.Generator, share: float,
+    wrong: Bool[np.ndarray, '15'], elsewhere: Float[np.ndarray, '15 2'],
 ) -> Float[np.ndarray, '15 2']:
-    """Return keypoints of which some lie anywhere in the box of what is seen of the person."""
+    """Return keypoints of which some lie elsewhere in the box of what is seen of the person."""
     if len(on_person) == 0:
         return keypoints
-    wrong = candidates & (rng.random(N_SHARED) < share)
-    anywhere = rng.uniform(on_person.min(axis=0), on_person.max(axis=0) + 1.0, (N_SHARED, 2))
-    return np.where(wrong[:, None], anywhere, keypoints)
+    low, high = on_person.min(axis=0), on_person.max(axis=0) + 1.0
+    return np.where(wrong[:, None], low + (high - low) * elsewhere, keypoints)
 
 
 def _inside(

@@ -105,15 +105,19 @@ def walking_pose(
         flex(pose, f'{side}_hip', np.deg2rad(stride * (26 * swing + 14 * lifted)))
         flex(pose, f'{side}_knee', -np.deg2rad(6 + stride * (48 * lifted + 6 * max(0.0, -swing))))
         flex(pose, f'{side}_ankle', np.deg2rad(stride * (8 * lifted - 10 * max(0.0, -swing))))
-        other = 'right' if side == 'left' else 'left'
-        arm = np.deg2rad(arms * 24 * swing)
-        index = JOINT_INDEX[f'{other}_shoulder'] - 1
-        forward = from_rotvec(np.array([-arm, 0.0, 0.0]))
-        pose[index] = to_rotvec(forward @ from_rotvec(pose[index]))
-        sign = 1.0 if other == 'left' else -1.0
-        pose[JOINT_INDEX[f'{other}_elbow'] - 1] = [0.0, -sign * (0.25 + 0.3 * max(0.0, arm)), 0.0]
+    swing_arms(pose, phase_rad, arms)
     set_joint(pose, 'spine2', [0.0, np.deg2rad(5) * np.sin(phase_rad), 0.0])
     return pose
+
+
+def swing_arms(pose: Float[np.ndarray, '23 3'], phase_rad: float, arms: float) -> None:
+    """Swing hanging arms as in a walk, each with the leg of the other side, in place."""
+    for side, phase, sign in (('left', phase_rad + np.pi, 1.0), ('right', phase_rad, -1.0)):
+        arm = np.deg2rad(arms * 24 * np.sin(phase))
+        index = JOINT_INDEX[f'{side}_shoulder'] - 1
+        forward = from_rotvec(np.array([-arm, 0.0, 0.0]))
+        pose[index] = to_rotvec(forward @ from_rotvec(pose[index]))
+        pose[JOINT_INDEX[f'{side}_elbow'] - 1] = [0.0, -sign * (0.25 + 0.3 * max(0.0, arm)), 0.0]
 
 
 def _draw_standing(model: BodyModel, rng: np.random.Generator) -> ScenePose:
