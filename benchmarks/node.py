@@ -39,7 +39,7 @@ from pop_ros.node_arguments import SourceArguments
 from pop_ros.node_config import NodeConfig
 from pop_ros.pairing import FramePairer
 from pop_ros.qos import output_qos
-from pop_ros.replay_dds import NodeProcess
+from pop_ros.replay_node import NodeProcess
 from pop_ros.to_messages import make_header
 
 Rows = list[dict[str, object]]

@@ -21,6 +21,7 @@ from pop_ros.frame_bag import write_frame_bag
 from pop_ros.node_arguments import SourceArguments
 from pop_ros.recorded_bodies import RecordedFrame, read_bodies, shown_bodies
 from pop_ros.replay import ReplaySummary
+from pop_ros.replay_pace import Pace
 from pop_ros.replay_session import ReplayRequest, run_replay
 from pop_ros.report3d import SceneFrame
 from pop_ros.result_folder import write_png
@@ -118,9 +119,9 @@ def record_scenes(
 def play_to_node(paths: DemoPaths, say: Callable[[str], None]) -> ReplaySummary:
     """Play the bag to a node in its own process and record what it publishes."""
     request = ReplayRequest(
-        bag=paths.camera_bag, out=paths.bodies_bag, ros1=None,
+        bags=(paths.camera_bag,), out=paths.bodies_bag, ros1=None,
         sources=SourceArguments('json', paths.keypoints), topics=(None, None, None), slop_s=0.01,
-        rate=1 / (RATE_HZ * SECONDS_PER_FRAME), every_frame=False, node_running=False)
+        pace=Pace(rate=1 / (RATE_HZ * SECONDS_PER_FRAME)))
     return run_replay(request, say)
 
 

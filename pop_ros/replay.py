@@ -24,6 +24,7 @@ from pop_ros.recording import Recording
 from pop_ros.statistics import drop_reason
 
 OUTPUT_NAMESPACE = '/pop'
+INTERRUPTED = 'ended by Ctrl-C; the results up to then are recorded'
 KINDS = {name: f'{kind.__module__.split(".")[0]}/msg/{kind.__name__}'
          for name, kind in RECORDED_TYPES.items()}
 
@@ -40,6 +41,7 @@ class ReplaySummary:
         drops: Pairs that gave no frame, by reason.
         latency_ms: Time per frame, or the node's own words about it.
         notes: What else the user must know.
+        interrupted: Whether the user ended it with Ctrl-C.
     """
 
     messages: int = 0
@@ -50,6 +52,7 @@ class ReplaySummary:
     latency_ms: list[float] = field(default_factory=list)
     latency_text: str = ''
     notes: list[str] = field(default_factory=list)
+    interrupted: bool = False
 
     def add_drop(self, error: PopError) -> None:
         """Count a pair that gave no frame; the first of its kind is told in full."""
@@ -58,6 +61,12 @@ class ReplaySummary:
         if self.drops[reason] == 1:
             self.notes.append(f'{reason}: {error}')
 
+    def add_damage(self, bag: Recording) -> None:
+        """Note what was wrong with a bag that has been read."""
+        if bag.damage:
+            self.notes.append(
+                f'the bag is damaged ({bag.damage}); what could be read was processed')
+
     def text(self) -> str:
         """Return the summary in lines."""
         latency = self.latency_text or percentiles(self.latency_ms)
@@ -65,7 +74,8 @@ class ReplaySummary:
             f'{self.frames} frames fitted of {self.pairs} pairs ({self.messages} messages), '
             f'{self.people} people, per frame {latency}']
         lines += [f'dropped {count}: {reason}' for reason, count in self.drops.most_common()]
-        return '\n'.join(lines + self.notes)
+        ended = [INTERRUPTED] if self.interrupted else []
+        return '\n'.join(lines + self.notes + ended)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,36 +141,37 @@ def replay_every_frame(
         summary.messages += 1
         on_message()
 
-    for frame in paired_frames(bag, topics, pairer, count):
-        summary.pairs += 1
-        started_s = time.perf_counter()
-        try:
-            _fit_and_write(frame, fitter, writer, summary)
-        except PopError as error:
-            summary.add_drop(error)
-        else:
-            summary.frames += 1
-            summary.latency_ms.append((time.perf_counter() - started_s) * 1e3)
-    summary.notes += notes(bag, pairer)
-    return summary
-
-
-def notes(bag: Recording, pairer: FramePairer[BagMessage]) -> list[str]:
-    """Return what the user must know about pairs that were refused and damage of the bag."""
-    found = []
+    try:
+        for frame in paired_frames(bag, topics, pairer, count):
+            _process(frame, fitter, writer, summary)
+    except KeyboardInterrupt:
+        summary.interrupted = True
     if pairer.statistics.missed:
-        found.append(
-            f'{pairer.statistics.missed} {MISSED}: '
-            f'{explain_refused_pairs(pairer)}')
-    if bag.damage:
-        found.append(f'the bag is damaged ({bag.damage}); what could be read was processed')
-    return found
+        summary.notes.append(
+            f'{pairer.statistics.missed} {MISSED}: {explain_refused_pairs(pairer)}')
+    summary.add_damage(bag)
+    return summary
 
 
 def announce_outputs(writer: BagWriter) -> None:
     """Create the output topics, so that a bag without people has them too."""
     for name, kind in KINDS.items():
         writer.add_topic(f'{OUTPUT_NAMESPACE}/{name}', kind)
+
+
+def _process(
+    frame: BagFrame, fitter: FrameFitter, writer: BagWriter, summary: ReplaySummary
+) -> None:
+    """Fit a frame, write its results and count it, or the reason why there are none."""
+    summary.pairs += 1
+    started_s = time.perf_counter()
+    try:
+        _fit_and_write(frame, fitter, writer, summary)
+    except PopError as error:
+        summary.add_drop(error)
+    else:
+        summary.frames += 1
+        summary.latency_ms.append((time.perf_counter() - started_s) * 1e3)
 
 
 def _fit_and_write(
@@ -173,4 +184,4 @@ def _fit_and_write(
         # The same frames give the same bytes, so that results can be compared as files.
         data = message if isinstance(message, bytes) else with_zero_padding(
             bytes(serialize_message(message)), KINDS[name])
-        writer.write(f'{OUTPUT_NAMESPACE}/{name}', KINDS[name], stamp_ns(color.header), data)
+        writer.write(f'{OUTPUT_NAMESPACE}/{name}', KINDS[name], frame.color.time_ns, data)

@@ -2,21 +2,36 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-NodeRunning = Annotated[bool, typer.Option(
-    '--node-running', help='Feed the node that is running instead of starting one.')]
+ENDED_BY_CTRL_C = 130  # as a shell counts it
+
+
+class Storage(str, Enum):
+    """Storages of a rosbag2."""
+
+    MCAP = 'mcap'
+    SQLITE3 = 'sqlite3'
 
 
 def replay(
-    bag: Annotated[Path, typer.Argument(help='A .bag, .db3 or .mcap file, or a rosbag2 folder.')],
+    bags: Annotated[list[Path], typer.Argument(
+        metavar='BAG...', help='A .bag, .db3 or .mcap file, or a rosbag2 folder; several are '
+                               'read as one, in order of time.')],
     *,
     out: Annotated[Path, typer.Option('--out', help='New rosbag2 folder for the results.')],
+    storage: Annotated[Storage, typer.Option(
+        '--storage', help='Storage of that rosbag2. Foxglove reads mcap, and what was written '
+                          'of it outlives a crash.')] = Storage.MCAP,
     ros1: Annotated[Path | None, typer.Option(
         '--ros1', help='Also write the results as this ROS 1 bag.')] = None,
+    inputs: Annotated[bool, typer.Option(
+        '--inputs', help="Copy the camera's messages and the transforms into the results.",
+    )] = False,
     keypoints: Annotated[str, typer.Option(
         '--keypoints', help='json (OpenPose files) or the path of an ONNX network; depth, the '
                             'embedded network, is not in this version.')] = 'depth',
@@ -29,35 +44,67 @@ def replay(
     info: Annotated[str | None, typer.Option('--info', help='CameraInfo of colour.')] = None,
     slop: Annotated[float, typer.Option(
         '--slop', min=0.0, max=10.0, help='Largest difference of stamps of a pair (s).')] = 0.03,
+    start: Annotated[float, typer.Option(
+        '--start', min=0.0, help='Begin this long after the first message (s).')] = 0.0,
+    duration: Annotated[float | None, typer.Option(
+        '--duration', min=0.0, help='End this long after the start (s).')] = None,
     rate: Annotated[float, typer.Option(
         '--rate', min=0.001, help='Speed at which the node is fed, 1 is as recorded.')] = 1.0,
+    loop: Annotated[bool, typer.Option(
+        '--loop', help='Play again and again until Ctrl-C, to look at it in rviz; the first '
+                       'round is recorded.')] = False,
+    step: Annotated[bool, typer.Option(
+        '--step', help='Wait for the Enter key before each colour image.')] = False,
+    clock: Annotated[bool, typer.Option(
+        '--clock', help='Publish the time of the recording on /clock; the node that is started '
+                        'uses it.')] = False,
     every_frame: Annotated[bool, typer.Option(
         '--every-frame', help='Fit every frame, without a node and without dropping.')] = False,
-    node_running: NodeRunning = False,
+    node_running: Annotated[bool, typer.Option(
+        '--node-running', help='Feed the node that is running instead of starting one.')] = False,
     pictures: Annotated[Path | None, typer.Option(
         '--pictures', help='Folder for a page with 3D views, and a film, as pop show draws them.',
     )] = None,
     rerun: Annotated[Path | None, typer.Option(
         '--rerun', metavar='FILE.rrd', help='Recording for the rerun viewer (extra viz).')] = None,
 ) -> None:
-    """Fit the people of a recorded bag and write mesh, joints and points into a new bag."""
-    from pop_core.errors import PopError
+    """Fit the people of a recording and write mesh, joints and points into a new bag.
+
+    The recording is played to the node over DDS, as a camera would; --every-frame does without
+    a node, drops nothing, and gives the same bytes every time.
+
+    Every frame, and what it looks like:
+
+      pop replay recording.bag --keypoints network.onnx --out bodies --every-frame --pictures look
+
+    Ten seconds of two bags over and over, for rviz with use_sim_time:
+
+      pop replay a.mcap b.mcap --keypoints network.onnx --out bodies --start 60 --duration 10
+      --loop --clock
+
+    A damaged bag is replayed as far as it can be read. Exit code 1 says that no frame was fitted.
+    """
+    from pop_ros.bag_merge import BagPart
     from pop_ros.dds_profile import use_large_shared_memory
     from pop_ros.node_arguments import SourceArguments
+    from pop_ros.replay_pace import Pace
     from pop_ros.replay_session import ReplayRequest, run_replay
 
+    if every_frame and (loop or step or clock or node_running):
+        raise typer.BadParameter(
+            '--loop, --step, --clock and --node-running play to a node: leave --every-frame away')
     use_large_shared_memory()
     request = ReplayRequest(
-        bag=bag, out=out, ros1=ros1, sources=SourceArguments(keypoints, keypoints_dir, decoder),
-        topics=(color, depth, info), slop_s=slop, rate=rate, every_frame=every_frame,
-        node_running=node_running)
-    try:
-        summary = run_replay(request, typer.echo)
-    except PopError as error:
-        typer.echo(f'pop replay: {error}', err=True)
-        raise typer.Exit(2) from error
+        bags=tuple(bags), out=out, ros1=ros1,
+        sources=SourceArguments(keypoints, keypoints_dir, decoder),
+        topics=(color, depth, info), slop_s=slop, every_frame=every_frame,
+        node_running=node_running, pace=Pace(rate, loop, step, clock),
+        part=BagPart(start, duration), storage=storage.value, inputs=inputs)
+    summary = run_replay(request, typer.echo)
     typer.echo(summary.text())
     typer.echo(f'results: {out}{f" and {ros1}" if ros1 else ""}')
+    if summary.interrupted:
+        raise typer.Exit(ENDED_BY_CTRL_C)
     if not summary.frames:
         raise typer.Exit(1)
     if pictures is not None or rerun is not None:

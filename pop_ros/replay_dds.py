@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import signal
 import struct
-import subprocess
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -13,63 +10,34 @@ from types import TracebackType
 from typing import Any
 
 import rclpy
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rosgraph_msgs.msg import Clock
 
-from pop_core.errors import PopError
-from pop_ros.bag_reader import BagReader
 from pop_ros.bag_topics import RgbdTopics
 from pop_ros.bag_writer import BagWriter
 from pop_ros.body_messages import RECORDED_TYPES
 from pop_ros.diagnostics import DROP_PREFIX, MISSED, RECEIVED, WHY_MISSED, read_values
 from pop_ros.inputs import COLOR, DEPTH, INFO, TRANSPORTS
-from pop_ros.node_arguments import SourceArguments
 from pop_ros.qos import output_qos
+from pop_ros.recording import Recording
 from pop_ros.replay import KINDS, OUTPUT_NAMESPACE, ReplaySummary, announce_outputs
+from pop_ros.replay_node import ReplayError
+from pop_ros.replay_pace import BagClock, EnterKey, Pace
 
 READY_S = 900.0  # a first start generates the pose library
 IDLE_S = 300.0  # the frame in work and the one that waits
 SETTLE_S = 1.5  # two reports of the node must agree that nothing is pending
 LOST_S = 10.0  # messages that have not arrived by then are lost
-STOP_S = 15.0
+CLOCK_PERIOD_S = 0.01
 NODE_NAME = '/pop'
 
 
-class ReplayError(PopError):
-    """A node that does not come up, or ends while a bag is played."""
-
-
-class NodeProcess:
-    """The node in a process of its own."""
-
-    def __init__(self, sources: SourceArguments, slop_s: float) -> None:
-        """Start it; it inherits the environment, so both sides share domain and RMW."""
-        command = [
-            sys.executable, '-m', 'pop_ros.node', *sources.as_flags(),
-            '--ros-args', '-p', f'sync.slop_s:={slop_s:.9f}']
-        self._process = subprocess.Popen(command)
-
-    def check(self) -> None:
-        """Raise ReplayError if it has ended."""
-        code = self._process.poll()
-        if code is not None:
-            raise ReplayError(f'replay: expected the node to run, found that it ended with {code}')
-
-    def stop(self) -> int:
-        """Ask it to end as Ctrl-C does; return its exit code."""
-        if self._process.poll() is None:
-            self._process.send_signal(signal.SIGINT)
-        try:
-            return self._process.wait(STOP_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            return self._process.wait()
-
-
-def bag_transports(bag: BagReader, topics: RgbdTopics) -> dict[str, tuple[str, type]]:
+def bag_transports(bag: Recording, topics: RgbdTopics) -> dict[str, tuple[str, type]]:
     """Return topic suffix and message type with which each role's messages are published."""
     kinds = {topic.name: topic.kind for topic in bag.topics}
     named = {COLOR: topics.color, DEPTH: topics.depth, INFO: topics.info}
@@ -83,15 +51,19 @@ class DdsPlayer:
     """Publishes a bag's images and records the node's outputs."""
 
     def __init__(
-        self, transports: Mapping[str, tuple[str, type]], check: Callable[[], None]
+        self, transports: Mapping[str, tuple[str, type]], check: Callable[[], None], pace: Pace
     ) -> None:
         """Join the ROS graph.
 
         Args:
             transports: Topic suffix and message type by role.
             check: Raises when there is no point in going on.
+            pace: How to play.
         """
         self._check = check
+        self._clock = BagClock(pace.rate)
+        self._enter = EnterKey() if pace.step else None
+        self._time_of_stamp: dict[int, int] = {}
         self._writer: BagWriter | None = None
         self._values: dict[str, str] = {}
         self._before: dict[str, str] = {}
@@ -108,6 +80,9 @@ class DdsPlayer:
             self._node.create_subscription(
                 kind, f'{OUTPUT_NAMESPACE}/{name}', self._recorder(name), output_qos(), raw=True)
         self._node.create_subscription(DiagnosticArray, '/diagnostics', self._on_report, 10)
+        if pace.clock:
+            self._time = self._node.create_publisher(Clock, '/clock', 1)
+            self._node.create_timer(CLOCK_PERIOD_S, self._publish_time)
 
     def __enter__(self) -> DdsPlayer:
         """Return the player."""
@@ -143,22 +118,32 @@ class DdsPlayer:
         announce_outputs(writer)
         self._writer = writer
 
+    def stop_recording(self) -> None:
+        """Write nothing more."""
+        self._writer = None
+
+    @property
+    def published(self) -> int:
+        """Return how many messages were published."""
+        return self._published.total()
+
     def play(
-        self, bag: BagReader, topics: RgbdTopics, rate: float, on_message: Callable[[], None]
-    ) -> int:
-        """Publish the bag's messages at `rate` times their own pace; return their number."""
+        self, bag: Recording, topics: RgbdTopics, on_message: Callable[[], None]
+    ) -> None:
+        """Publish the bag's messages at their pace."""
         roles = {topics.color: COLOR, topics.depth: DEPTH, topics.info: INFO}
-        started_s = first_ns = None
+        self._clock.rewind()
         for message in bag.messages(topics.all):
-            if started_s is None or first_ns is None:
-                started_s, first_ns = time.monotonic(), message.time_ns
-            due_s = started_s + (message.time_ns - first_ns) / 1e9 / rate
-            self._spin(due_s - time.monotonic(), lambda: False)
             role = roles[message.topic]
+            if role == COLOR:
+                self._wait_for_enter()
+                self._time_of_stamp[_stamp_ns(message.data)] = message.time_ns
+            self._clock.go_on(message.time_ns)
+            self._spin(self._clock.seconds_until(message.time_ns), lambda: False)
             self._publishers[role].publish(message.data)
             self._published[role] += 1
             on_message()
-        return self._published.total()
+        self._clock.pause()
 
     def finish(self, summary: ReplaySummary) -> None:
         """Wait until the node has nothing left to do and take over its counts."""
@@ -202,15 +187,33 @@ class DdsPlayer:
             self._executor.spin_once(timeout_sec=min(left_s, 0.05))
         return finished
 
+    def _wait_for_enter(self) -> None:
+        """Let a frame that waits for the Enter key wait, and the time of the recording stand."""
+        if self._enter is not None:
+            self._clock.pause()
+            while not self._spin(1.0, self._enter.may_pass):
+                pass
+
+    def _publish_time(self) -> None:
+        now_ns = self._clock.now_ns()
+        if now_ns is not None:
+            sec, nanosec = divmod(now_ns, 1_000_000_000)
+            self._time.publish(Clock(clock=Time(sec=sec, nanosec=nanosec)))
+
     def _recorder(self, name: str) -> Callable[[bytes], None]:
         def record(data: bytes) -> None:
-            # Every output starts with a header, and that with its stamp.
-            sec, nanosec = struct.unpack_from('<iI', data, 4)
-            time_ns = sec * 1_000_000_000 + nanosec
-            if self._writer is None:
-                return
-            self._writer.write(f'{OUTPUT_NAMESPACE}/{name}', KINDS[name], time_ns, bytes(data))
+            if self._writer is not None:
+                stamp_ns = _stamp_ns(data)
+                time_ns = self._time_of_stamp.get(stamp_ns, stamp_ns)
+                self._writer.write(
+                    f'{OUTPUT_NAMESPACE}/{name}', KINDS[name], time_ns, bytes(data))
         return record
 
     def _on_report(self, message: Any) -> None:
         self._values = read_values(message, NODE_NAME) or self._values
+
+
+def _stamp_ns(data: bytes) -> int:
+    """Return the stamp of a stored message [ns]: images and outputs begin with their header."""
+    sec, nanosec = struct.unpack_from('<iI', data, 4)
+    return int(sec * 1_000_000_000 + nanosec)

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 
 def show(
-    recording: Annotated[Path, typer.Argument(help='Bag of the camera.')],
+    recording: Annotated[list[Path], typer.Argument(
+        metavar='RECORDING...', help='Bag of the camera; several are read as one.')],
     bodies: Annotated[Path, typer.Argument(help='Bag that pop replay made of it.')],
     *,
     out: Annotated[Path | None, typer.Option(
@@ -41,7 +42,7 @@ def show(
         raise typer.BadParameter('expected --out, --rerun or both, found neither')
     model = default_body() if body is None else load_body_model(body)
     _draw(model, rerun, out, ShowRequest(
-        recording=recording, bodies=bodies, out=out or Path(), topics=(color, depth, info),
+        recordings=tuple(recording), bodies=bodies, out=out or Path(), topics=(color, depth, info),
         slop_s=slop, film=film))
 
 
@@ -53,7 +54,7 @@ def draw_replay(
     from pop_ros.show_recording import ShowRequest
 
     _draw(default_body(), rerun, out, ShowRequest(
-        recording=replayed.bag, bodies=replayed.out, out=out or Path(), topics=replayed.topics,
+        recordings=replayed.bags, bodies=replayed.out, out=out or Path(), topics=replayed.topics,
         slop_s=replayed.slop_s, notes=notes))
 
 

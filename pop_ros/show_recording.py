@@ -16,11 +16,13 @@ from pop_core.rendering.pictures import four_panels
 from pop_core.rendering.shown_body import ShownBody
 from pop_core.rendering.summary_film import SummaryFilm
 from pop_core.rgbd import RgbdFrame
-from pop_ros.bag_reader import BagMessage, BagReader
+from pop_ros.bag_merge import MergedBags
+from pop_ros.bag_reader import BagMessage
 from pop_ros.bag_topics import RgbdTopics, find_topics
 from pop_ros.from_messages import frame_from_messages
 from pop_ros.pairing import FramePairer
 from pop_ros.recorded_bodies import RecordedFrame, read_bodies, shown_bodies
+from pop_ros.recording import Recording
 from pop_ros.replay import paired_frames
 from pop_ros.report import Report
 from pop_ros.report3d import SceneFrame
@@ -46,7 +48,7 @@ class ShowRequest:
     """What to draw.
 
     Args:
-        recording: Bag of the camera.
+        recordings: Bags of the camera, read as one.
         bodies: Bag that `pop replay` made of it.
         out: Folder for `report.html` and the film.
         topics: Colour, depth and CameraInfo topics where the user named them.
@@ -55,13 +57,18 @@ class ShowRequest:
         notes: What else the page should say, line by line.
     """
 
-    recording: Path
+    recordings: tuple[Path, ...]
     bodies: Path
     out: Path
     topics: tuple[str | None, str | None, str | None] = (None, None, None)
     slop_s: float = 0.5
     film: str = 'film.mp4'
     notes: Sequence[str] = ()
+
+    @property
+    def name(self) -> str:
+        """Return the recordings' names."""
+        return ' and '.join(path.name for path in self.recordings)
 
 
 def show_recording(
@@ -94,7 +101,7 @@ def show_recording(
             on_frame(counts.frames)
     if not counts.frames:
         raise ShowError(
-            f'{request.recording}: expected the recording that {request.bodies} was made of, '
+            f'{request.name}: expected the recording that {request.bodies} was made of, '
             'found no frame with these stamps')
     _write_page(page, request, model, _evenly(kept, MAX_PICTURES), counts)
     return page, film_path
@@ -126,7 +133,7 @@ def read_scenes(request: ShowRequest, model: BodyModel) -> Iterator[SceneFrame]:
     if not recorded:
         raise ShowError(f'{request.bodies}: expected recorded bodies, found none')
     first_ns, last_ns = min(recorded), max(recorded)
-    with BagReader(request.recording) as bag:
+    with MergedBags(request.recordings) as bag:
         topics = find_topics(bag, *request.topics)
         for frame in _frames(bag, topics, request.slop_s):
             if first_ns <= frame.stamp_ns <= last_ns:
@@ -134,7 +141,7 @@ def read_scenes(request: ShowRequest, model: BodyModel) -> Iterator[SceneFrame]:
                 yield SceneFrame(frame, bodies, _caption(frame, bodies, first_ns))
 
 
-def _frames(bag: BagReader, topics: RgbdTopics, slop_s: float) -> Iterator[RgbdFrame]:
+def _frames(bag: Recording, topics: RgbdTopics, slop_s: float) -> Iterator[RgbdFrame]:
     pairer: FramePairer[BagMessage] = FramePairer(round(slop_s * 1e9))
     for frame in paired_frames(bag, topics, pairer, lambda: None):
         try:
@@ -171,7 +178,7 @@ def _write_page(
     counts: _Counts,
 ) -> None:
     report = Report(
-        f'pop: {request.recording.name}',
+        f'pop: {request.name}',
         f'Frames: {counts.frames}. Bodies: {counts.people}. The camera sees {counts.seen} of '
         f'their {counts.seen + counts.hidden} joints; the others were inferred.')
     report.scenes([scene for scene, _ in _evenly(kept, MAX_SCENES)], model.f)

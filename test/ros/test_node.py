@@ -25,6 +25,7 @@ from pop_ros.bag_reader import BagReader
 from pop_ros.from_messages import stamp_ns
 from pop_ros.node_arguments import SourceArguments
 from pop_ros.replay import ReplaySummary
+from pop_ros.replay_pace import Pace
 from pop_ros.replay_session import ReplayRequest, run_replay
 from pop_ros.to_messages import CLOUD_TYPE
 
@@ -52,9 +53,10 @@ def replay(
     bag: Path, out: Path, recording: Recording, *, every_frame: bool = False
 ) -> ReplaySummary:
     request = ReplayRequest(
-        bag=bag, out=out, ros1=None, sources=SourceArguments('json', recording.keypoints),
-        topics=(None, None, None), slop_s=0.01, rate=1 / (RATE_HZ * SECONDS_PER_FRAME),
-        every_frame=every_frame, node_running=True)
+        bags=(bag,), out=out, ros1=None, sources=SourceArguments('json', recording.keypoints),
+        topics=(None, None, None), slop_s=0.01,
+        pace=Pace(rate=1 / (RATE_HZ * SECONDS_PER_FRAME)), every_frame=every_frame,
+        node_running=True)
     return run_replay(request, lambda _text: None)
 
 

@@ -76,7 +76,7 @@ def test_bodies_of_another_body_model_are_refused(drawn: Path) -> None:
     model = default_body()
     other = replace(model, f=model.f[:-10])
     with pytest.raises(ShowError, match=r'expected meshes of \d+ triangles'):
-        show_recording(ShowRequest(drawn / 'camera', drawn / 'bodies', drawn / 'no'), other)
+        show_recording(ShowRequest((drawn / 'camera',), drawn / 'bodies', drawn / 'no'), other)
 
 
 def test_bodies_of_another_recording_are_refused(
@@ -85,4 +85,4 @@ def test_bodies_of_another_recording_are_refused(
     later = [replace(s.frame, stamp_ns=s.frame.stamp_ns + 10**12) for s in recording.scenes[:1]]
     other = write_frames(tmp_path / 'other.db3', later, '16UC1')
     with pytest.raises(ShowError, match='found no frame with these stamps'):
-        show_recording(ShowRequest(other, drawn / 'bodies', tmp_path / 'out'), default_body())
+        show_recording(ShowRequest((other,), drawn / 'bodies', tmp_path / 'out'), default_body())
