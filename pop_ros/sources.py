@@ -1,4 +1,4 @@
-"""Where keypoints come from, and the one place where a pipeline is put together."""
+"""The one place where a pipeline is put together."""
 
 from __future__ import annotations
 
@@ -6,41 +6,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pop_core.errors import PopError
+from pop_ros.keypoint_sources import SOURCES, SourceError, make_detector
 
 if TYPE_CHECKING:
     from pop_core.config import PipelineConfig
     from pop_core.keypoints.detection import KeypointDetector
     from pop_core.pipeline import BodyPipeline
 
-SOURCES = "'json' (OpenPose files), or the path of an ONNX network"
+__all__ = ['SOURCES', 'SourceError', 'make_detector', 'make_pipeline']
+
 Progress = Callable[[float, str], None]
-
-
-class SourceError(PopError):
-    """A keypoint source that does not exist or lacks what it needs."""
-
-
-def make_detector(
-    spec: str, keypoints_dir: Path | None = None, decoder: str | None = None
-) -> KeypointDetector:
-    """Return the keypoint source that a user named.
-
-    Args:
-        spec: 'json' or the path of an ONNX network.
-        keypoints_dir: Folder of `<stamp_ns>.json` files; needed by 'json'.
-        decoder: Decoder of the network's outputs where they do not tell; None chooses.
-
-    Raises:
-        SourceError: If there is no such source, or a folder is missing.
-        NetworkShapeError: If the network fits no decoder.
-    """
-    if spec == 'json':
-        return _json_detector(keypoints_dir)
-    if spec == 'depth':
-        raise SourceError(
-            f'keypoints: expected {SOURCES}, found depth: this version has no embedded network')
-    return _network_detector(Path(spec), decoder)
 
 
 def make_pipeline(
@@ -86,23 +61,3 @@ def _as_counter(progress: Progress) -> Callable[[int, int], None]:
         progress(share, f'generating the pose library: {done} of {wanted} poses')
 
     return told
-
-
-def _json_detector(folder: Path | None) -> KeypointDetector:
-    from pop_core.keypoints.openpose_json import OpenPoseJsonDetector
-
-    if folder is None or not folder.is_dir():
-        found = 'none' if folder is None else f'{folder}, which is no folder'
-        raise SourceError(
-            f'keypoints: expected a folder of <stamp_ns>.json files (--keypoints-dir), '
-            f'found {found}')
-    return OpenPoseJsonDetector(folder)
-
-
-def _network_detector(path: Path, decoder: str | None) -> KeypointDetector:
-    from pop_core.keypoints.onnx_detector import OnnxKeypointDetector
-
-    if path.suffix != '.onnx' or not path.is_file():
-        why = 'is not there' if not path.is_file() else 'does not end in .onnx'
-        raise SourceError(f'keypoints: expected {SOURCES}, found {path}, which {why}')
-    return OnnxKeypointDetector(path, decoder)

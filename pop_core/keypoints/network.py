@@ -1,4 +1,4 @@
-"""What an ONNX network takes and gives, and the protocol of the decoders that understand it."""
+"""What an ONNX network takes and gives, and the protocols of decoders that understand it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import ClassVar, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Shaped, UInt8
 
+from pop_core.keypoints.boxes import PersonBox
 from pop_core.keypoints.detection import Detection
 
 Tensor = Shaped[np.ndarray, '...']
@@ -45,7 +46,7 @@ class NetworkSpec:
 
 @runtime_checkable
 class NetworkDecoder(Protocol):
-    """Understands one family of networks: prepares its input, turns its outputs into people."""
+    """Understands one family of networks: prepares its input, reads its outputs."""
 
     name: ClassVar[str]
     expects: ClassVar[str]
@@ -59,6 +60,31 @@ class NetworkDecoder(Protocol):
         """Return whether this family's inputs and outputs look like that."""
         ...
 
+
+@runtime_checkable
+class PeopleDecoder(NetworkDecoder, Protocol):
+    """Finds people in a whole image."""
+
     def detect(self, rgb: UInt8[np.ndarray, 'h w 3'], run: Run) -> list[Detection]:
         """Return the people of an image; `run` computes the outputs of one input, in order."""
+        ...
+
+
+@runtime_checkable
+class TopDownDecoder(NetworkDecoder, Protocol):
+    """Finds the joints of the one person inside a box that somebody else found."""
+
+    def detect_in(
+        self, rgb: UInt8[np.ndarray, 'h w 3'], boxes: Sequence[PersonBox], run: Run
+    ) -> list[Detection]:
+        """Return one person for every box in which one is seen."""
+        ...
+
+
+@runtime_checkable
+class BoxDecoder(NetworkDecoder, Protocol):
+    """Finds where people are, without their joints."""
+
+    def find_boxes(self, rgb: UInt8[np.ndarray, 'h w 3'], run: Run) -> list[PersonBox]:
+        """Return a box around every person, best first."""
         ...

@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Float, Float32, UInt8
 
 from pop_core.keypoints import personlab_kernels as kernels
-from pop_core.keypoints.coco17 import shared_from_coco17
 from pop_core.keypoints.detection import Detection
+from pop_core.keypoints.keypoint_sets import COCO_17, shared_joints
 from pop_core.keypoints.letterbox import letterbox
 from pop_core.keypoints.network import NetworkSpec, Run, Tensor
 from pop_core.keypoints.people import detection_of
@@ -36,6 +36,8 @@ NMS_SHARE = 0.04  # of the input's diagonal, as 40 px of 641 x 481 in the paper'
 # Codes end at 10 px, and the disc of cells that know a keypoint is 32 px wide: two steps, as in
 # the paper, leave elbows 14 cm off.
 REFINEMENTS = 5
+MOST_SEEDS = 2000  # a hundred people have as many; a map of nothing but maxima has more
+LARGE_PX = 1e4  # beyond any place in an input, and a logit of certainty
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,21 +94,25 @@ class PersonLabDecoder:
         detections = []
         for person in decode_people(maps, NMS_SHARE * float(np.hypot(self.width, self.height))):
             uv = placed.to_image(person[:, 1::-1])
-            keypoints_px, scores = shared_from_coco17(uv, person[:, 2])
-            detections.append(detection_of(keypoints_px, scores))
+            keypoints_px, scores = shared_joints(COCO_17, uv, person[:, 2])
+            if scores.any():
+                detections.append(detection_of(keypoints_px, scores))
         return detections
 
 
 def read_maps(outputs: Sequence[Tensor], width: int) -> PersonLabMaps:
     """Return heatmaps, short and mid offsets as values; codes are decoded where they are uint8."""
-    heat, short, mid = (output[0].astype(np.float32) for output in outputs)
+    # What is no number decides nothing: without a score it seeds nobody.
+    heat, short, mid = (
+        np.nan_to_num(output[0].astype(np.float32), nan=-LARGE_PX, posinf=LARGE_PX,
+                      neginf=-LARGE_PX).clip(-LARGE_PX, LARGE_PX) for output in outputs)
     if outputs[0].dtype == np.uint8:
         heat = (heat - HEAT_ZERO) * HEAT_STEP
         short = (short - HEAT_ZERO) * HEAT_STEP
         mid = (mid - MID_ZERO) * MID_STEP
     h, w = heat.shape[:2]
     return PersonLabMaps(
-        (1.0 / (1.0 + np.exp(-heat))).astype(np.float32),
+        (1.0 / (1.0 + np.exp(-np.clip(heat, -50.0, 50.0)))).astype(np.float32),
         short.reshape(h, w, 2, N_KEYPOINTS).astype(np.float32),
         mid.reshape(h, w, 2, 2, len(EDGES)).astype(np.float32),
         (width - 1) / (w - 1))
@@ -120,9 +126,10 @@ def decode_people(maps: PersonLabMaps, nms_radius_px: float) -> list[Float[np.nd
     """
     cells = kernels.local_maxima(maps.scores, SEED_SCORE)
     strength = maps.scores[cells[:, 0], cells[:, 1], cells[:, 2]]
+    cells = cells[np.argsort(-strength, kind='stable')][:MOST_SEEDS]
     people: list[Float[np.ndarray, '17 3']] = []
     worth: list[float] = []
-    for row, column, j in cells[np.argsort(-strength, kind='stable')]:
+    for row, column, j in cells:
         y, x = kernels.refined(
             row * maps.stride, column * maps.stride, j, maps.short, maps.stride, REFINEMENTS)
         if any(np.hypot(p[j, 0] - y, p[j, 1] - x) <= nms_radius_px for p in people):

@@ -12,21 +12,13 @@ from typing import ClassVar
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
 
-from pop_core.body.joints import N_SHARED, SHARED_INDEX
 from pop_core.keypoints.detection import Detection
+from pop_core.keypoints.keypoint_sets import MPII_16, shared_joints
 from pop_core.keypoints.letterbox import letterbox
-from pop_core.keypoints.neck import with_smpl_neck
 from pop_core.keypoints.network import NetworkSpec, Run
+from pop_core.keypoints.network_input import IMAGENET, planes
 from pop_core.keypoints.people import detection_of
 
-MEAN, STD = np.array([0.485, 0.456, 0.406]), np.array([0.229, 0.224, 0.225])
-# Channels in order. MPII marks no nose, so the head stays undetected; its thorax lies between the
-# shoulders, as other detectors' neck.
-CHANNELS = (
-    'head_top', 'upper_neck', 'right_shoulder', 'right_elbow', 'right_wrist', 'neck',
-    'left_shoulder', 'left_elbow', 'left_wrist', 'pelvis', 'right_hip', 'right_knee',
-    'right_ankle', 'left_hip', 'left_knee', 'left_ankle',
-)
 MIN_PEAK = 0.2
 MIN_KEYPOINTS = 4
 SMALL_PERSON = 0.5  # of the image's longer side
@@ -47,7 +39,7 @@ class SinglePersonHeatmapDecoder:
         _, height, width, _ = spec.inputs[0].shape
         self.height, self.width = int(height or 0), int(width or 0)
         rows = [
-            (o.shape[1] or 0) if len(o.shape) == 4 and o.shape[-1] == len(CHANNELS) else 0
+            (o.shape[1] or 0) if len(o.shape) == 4 and o.shape[-1] == len(MPII_16) else 0
             for o in spec.outputs
         ]
         self.output = int(np.argmax(rows))
@@ -60,7 +52,7 @@ class SinglePersonHeatmapDecoder:
         shape = spec.inputs[0].shape
         image = len(shape) == 4 and None not in shape and shape[0] == 1 and shape[3] == 3
         return image and any(
-            len(output.shape) == 4 and output.shape[-1] == len(CHANNELS)
+            len(output.shape) == 4 and output.shape[-1] == len(MPII_16)
             and output.dtype == 'float32' for output in spec.outputs)
 
     def detect(self, rgb: UInt8[np.ndarray, 'h w 3'], run: Run) -> list[Detection]:
@@ -78,21 +70,18 @@ class SinglePersonHeatmapDecoder:
 
     def _look(self, rgb: UInt8[np.ndarray, 'h w 3'], run: Run) -> Detection | None:
         image, placed = letterbox(rgb, self.height, self.width)
-        tensor = ((image / 255.0 - MEAN) / STD).astype(np.float32)[None]
-        heat = np.asarray(run(tensor)[self.output][0], dtype=np.float32)
+        tensor = np.ascontiguousarray(planes(image, IMAGENET).transpose(0, 2, 3, 1))
+        heat = np.nan_to_num(run(tensor)[self.output][0].astype(np.float32))
         cells, peaks = heatmap_peaks(heat)
         # A map's cell covers several pixels; its centre lies in the middle of them.
         factor = np.array([self.width / heat.shape[1], self.height / heat.shape[0]])
         uv = placed.to_image((cells + 0.5) * factor - 0.5)
-        shared_px, scores = np.full((N_SHARED, 2), np.nan), np.zeros(N_SHARED)
         inside = np.all((uv >= -0.5) & (uv < [rgb.shape[1] - 0.5, rgb.shape[0] - 0.5]), axis=1)
-        for channel, name in enumerate(CHANNELS):
-            if name in SHARED_INDEX and peaks[channel] >= MIN_PEAK and inside[channel]:
-                shared_px[SHARED_INDEX[name]] = uv[channel]
-                scores[SHARED_INDEX[name]] = min(1.0, float(peaks[channel]))
+        found = np.where(inside & (peaks >= MIN_PEAK), peaks, 0.0)
+        keypoints_px, scores = shared_joints(MPII_16, uv, found)
         if np.count_nonzero(scores) < MIN_KEYPOINTS:
             return None
-        return detection_of(with_smpl_neck(shared_px), scores)
+        return detection_of(keypoints_px, scores)
 
 
 def heatmap_peaks(

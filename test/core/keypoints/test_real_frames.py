@@ -10,7 +10,7 @@ import pytest
 from pop_core.body.joints import SHARED_INDEX
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.lifting import lift_keypoints
-from pop_core.keypoints.onnx_detector import OnnxKeypointDetector
+from pop_core.keypoints.onnx_detector import load_source
 from pop_core.rgbd import RgbdFrame, clean_depth
 
 SHARED = Path(__file__).resolve().parents[4] / 'shared' / 'data'
@@ -22,7 +22,7 @@ SOFA = ('00', '06', '12', '18', '24', '30', '36', '42', '48', '54', '60', '66')
 def detector():
     if not NETWORK.is_file():
         pytest.skip(f'looked for {NETWORK}')
-    return OnnxKeypointDetector(NETWORK)
+    return load_source(NETWORK)
 
 
 def load(name):

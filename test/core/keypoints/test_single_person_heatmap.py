@@ -2,12 +2,9 @@ import numpy as np
 import pytest
 
 from pop_core.body.joints import SHARED_INDEX
+from pop_core.keypoints.keypoint_sets import MPII_16
 from pop_core.keypoints.network import NetworkSpec, TensorSpec
-from pop_core.keypoints.single_person_heatmap import (
-    CHANNELS,
-    SinglePersonHeatmapDecoder,
-    heatmap_peaks,
-)
+from pop_core.keypoints.single_person_heatmap import SinglePersonHeatmapDecoder, heatmap_peaks
 
 
 def spec_of(*map_shapes, size=368):
@@ -54,7 +51,7 @@ def test_joints_come_back_in_pixels_of_the_image_without_a_head():
     heat = spots(places, 368, 368, sigma=6.0)
     decoder = SinglePersonHeatmapDecoder(spec_of((1, 368, 368, 16)))
     (person,) = decoder.detect(np.zeros((736, 736, 3), np.uint8), lambda _: [heat[None]])
-    for channel, name in enumerate(CHANNELS):
+    for channel, name in enumerate(MPII_16.names):
         if name in SHARED_INDEX and name != 'neck':
             expected = (places[channel] + 0.5) * 2 - 0.5
             np.testing.assert_allclose(

@@ -1,0 +1,149 @@
+"""Load and run ONNX networks with ONNX Runtime; an unknown file is taken for a hostile one.
+
+What a file may do is bounded before it is run: its size, where it reads from (nowhere else), the
+sizes of its inputs and outputs, what is computed while it is loaded. Everything that fails is told
+in one line.
+"""
+
+from __future__ import annotations
+
+import math
+import stat
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+
+from pop_core.errors import NetworkShapeError
+from pop_core.keypoints.network import NetworkSpec, Tensor, TensorSpec
+
+THREADS = 2
+LARGEST_FILE = 2**31 - 1  # bytes; a protobuf cannot be larger
+LARGEST_TENSOR = 2**27  # elements: 512 MB of float32
+FOLDING_BYTES = 2**26
+DTYPES = {
+    'tensor(uint8)': 'uint8', 'tensor(int32)': 'int32', 'tensor(float)': 'float32',
+    'tensor(float16)': 'float16', 'tensor(int64)': 'int64',
+}
+FLOATS = ('float32', 'float16')
+# Fastest first. TensorRT is left out: it builds engines for minutes on first use.
+PROVIDERS = ('CUDAExecutionProvider', 'CPUExecutionProvider')
+
+
+class OnnxSession:
+    """A loaded network."""
+
+    def __init__(self, content: bytes, where: str) -> None:
+        """Load a network.
+
+        Args:
+            content: What the .onnx file holds.
+            where: Name of the file, for messages.
+
+        Raises:
+            NetworkShapeError: If it is no network, needs other files or unknown operators, or
+                declares tensors of impossible sizes.
+        """
+        self.where = where
+        self._session = _load(content, where)
+        self.spec = _spec(self._session)
+        for tensor in (*self.spec.inputs, *self.spec.outputs):
+            if math.prod(size or 1 for size in tensor.shape) > LARGEST_TENSOR:
+                raise NetworkShapeError(
+                    f'{where}: expected tensors of up to {LARGEST_TENSOR} elements, '
+                    f'found {tensor}')
+
+    def run(self, tensor: Tensor) -> Sequence[Tensor]:
+        """Return the outputs of one input, in the network's order, half floats as floats.
+
+        Raises:
+            NetworkShapeError: If the network fails, or gives other shapes than it declares.
+        """
+        entry = self.spec.inputs[0]
+        if entry.dtype in FLOATS:
+            tensor = tensor.astype(entry.dtype, copy=False)
+        try:
+            outputs = self._session.run(None, {entry.name: tensor})
+        except Exception as error:  # noqa: BLE001 - ONNX Runtime's errors share no public base
+            raise NetworkShapeError(
+                f'{self.where}: expected outputs, found: {_one_line(error)}') from None
+        arrays = [np.asarray(output) for output in outputs]
+        for declared, array in zip(self.spec.outputs, arrays, strict=True):
+            _check_shape(declared, array, self.where)
+        return [a.astype(np.float32) if a.dtype == np.float16 else a for a in arrays]
+
+
+def load_network(path: Path) -> OnnxSession:
+    """Return the network of a file.
+
+    Raises:
+        NetworkShapeError: If there is no such file or it is no network that can be run.
+    """
+    return OnnxSession(read_network(path), str(path))
+
+
+def read_network(path: Path) -> bytes:
+    """Return what a file of sane size holds.
+
+    Raises:
+        NetworkShapeError: If there is none, or it is no regular file, or too large.
+    """
+    try:
+        found = path.stat()
+        if not stat.S_ISREG(found.st_mode):
+            raise NetworkShapeError(f'{path}: expected an ONNX file, found none: not a file')
+        if found.st_size > LARGEST_FILE:
+            raise NetworkShapeError(
+                f'{path}: expected an ONNX file of up to {LARGEST_FILE} bytes, '
+                f'found {found.st_size}')
+        return path.read_bytes()
+    except OSError as error:
+        raise NetworkShapeError(
+            f'{path}: expected an ONNX file, found: {error.strerror}') from None
+
+
+def _load(content: bytes, where: str) -> onnxruntime.InferenceSession:
+    onnxruntime.disable_telemetry_events()  # a robot's perception tells nobody what it runs
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = THREADS
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 4  # what goes wrong is raised, and told once
+    # Spinning threads would take the cores from the fit between two images.
+    options.add_session_config_entry('session.intra_op.allow_spinning', '0')
+    # A file of 100 bytes may ask for a constant of gigabytes, computed while it is loaded.
+    options.add_session_config_entry(
+        'optimization.constant_folding_max_output_size_in_bytes', str(FOLDING_BYTES))
+    there = onnxruntime.get_available_providers()
+    providers = [name for name in PROVIDERS if name in there]
+    try:
+        # From memory a network cannot name other files as its weights.
+        return onnxruntime.InferenceSession(content, options, providers=providers)
+    except Exception as error:  # noqa: BLE001 - ONNX Runtime's errors share no public base
+        raise NetworkShapeError(
+            f'{where}: expected an ONNX network, found: {_one_line(error)}') from None
+
+
+def _one_line(error: Exception) -> str:
+    return ' '.join(str(error).split())[:160]
+
+
+def _check_shape(declared: TensorSpec, array: Tensor, where: str) -> None:
+    same = array.ndim == len(declared.shape) and all(
+        size is None or size == found
+        for size, found in zip(declared.shape, array.shape, strict=True))
+    if not same or array.size > LARGEST_TENSOR:
+        raise NetworkShapeError(f'{where}: expected {declared}, found shape {array.shape}')
+
+
+def _spec(session: onnxruntime.InferenceSession) -> NetworkSpec:
+    sides = ([_tensor(item) for item in side]
+             for side in (session.get_inputs(), session.get_outputs()))
+    inputs, outputs = (tuple(side) for side in sides)
+    return NetworkSpec(inputs, outputs)
+
+
+def _tensor(item: onnxruntime.NodeArg) -> TensorSpec:
+    shape = tuple(
+        size if isinstance(size, int) and size > 0 else None for size in item.shape)
+    return TensorSpec(item.name, shape, DTYPES.get(item.type, item.type))

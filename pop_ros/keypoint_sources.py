@@ -1,0 +1,152 @@
+"""Which keypoint sources a user named: one, or several that are merged."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pop_core.errors import PopError
+
+if TYPE_CHECKING:
+    from pop_core.keypoints.boxes import BoxDetector, TopDownDetector
+    from pop_core.keypoints.detection import KeypointDetector
+    from pop_core.keypoints.onnx_detector import OnnxSource
+
+    Source = KeypointDetector | BoxDetector | TopDownDetector
+
+SOURCES = "'json' (OpenPose files), the path of an ONNX network, or a name of `pop models list`"
+
+
+class SourceError(PopError):
+    """A keypoint source that does not exist or lacks what it needs."""
+
+
+def make_detector(
+    spec: str,
+    keypoints_dir: Path | None = None,
+    decoder: str | None = None,
+    json_source: KeypointDetector | None = None,
+) -> KeypointDetector:
+    """Return the keypoint source that a user named; several, with commas between, are merged.
+
+    A network that looks into boxes gets those of the others.
+
+    Args:
+        spec: 'json', the path of an ONNX network or a name of the registry, each perhaps behind
+            `DECODER@`; commas between several.
+        keypoints_dir: Folder of `<stamp_ns>.json` files; needed by 'json'.
+        decoder: Decoder of the only network's outputs where they do not tell; None chooses.
+        json_source: What 'json' stands for in place of a folder.
+
+    Raises:
+        SourceError: If there is no such source, or something that it needs is missing.
+        NetworkShapeError: If a network fits no decoder.
+    """
+    from pop_core.keypoints.boxes import BoxDetector, TopDownDetector
+    from pop_core.keypoints.detection import KeypointDetector
+    from pop_core.keypoints.fusion import FusedDetector
+
+    words = split_sources(spec)
+    if decoder is not None:
+        words = _with_decoder(words, decoder)
+    sources = [_source(word, keypoints_dir, json_source) for word in words]
+    people = [source for source in sources if isinstance(source, KeypointDetector)]
+    boxes = [source for source in sources if isinstance(source, BoxDetector)]
+    top_down = [source for source in sources if isinstance(source, TopDownDetector)]
+    if boxes and not top_down:
+        raise SourceError(
+            f'keypoints: expected a network that looks into boxes beside one that finds them, '
+            f'found {spec} alone: add one such as rtmpose-m')
+    if top_down and not people and not boxes:
+        people = [_boxes_for(spec)]
+    if len(people) == 1 and not top_down:
+        return people[0]
+    return FusedDetector(people, boxes, top_down)
+
+
+def split_sources(spec: str) -> list[str]:
+    """Return the sources of a list with commas; a file whose name has a comma is one source.
+
+    Raises:
+        SourceError: If none is named, or one twice.
+    """
+    words = [spec] if Path(spec).is_file() else [word.strip() for word in spec.split(',')]
+    if not all(words):
+        raise SourceError(f'keypoints: expected {SOURCES}, found {spec!r}')
+    if len(set(words)) < len(words):
+        raise SourceError(f'keypoints: expected each source once, found {spec!r}')
+    return words
+
+
+def reasons(detector: object) -> list[str]:
+    """Return a sentence about each network: how it is read, and why so."""
+    from pop_core.keypoints.fusion import FusedDetector
+
+    parts: Sequence[object] = [detector]
+    if isinstance(detector, FusedDetector):
+        parts = [*detector.people, *detector.boxes, *detector.top_down]
+    return [str(part.reason) for part in parts if hasattr(part, 'reason')]
+
+
+def _with_decoder(words: Sequence[str], decoder: str) -> list[str]:
+    networks = [word for word in words if word not in ('json', 'depth')]
+    if len(networks) != 1:
+        raise SourceError(
+            f'keypoints: expected one network beside --decoder, found {", ".join(words)}: '
+            'write DECODER@NETWORK')
+    return [f'{decoder}@{word}' if word in networks else word for word in words]
+
+
+def _source(
+    word: str, keypoints_dir: Path | None, json_source: KeypointDetector | None
+) -> Source:
+    if word == 'json':
+        return json_source or _json_detector(keypoints_dir)
+    if word == 'depth':
+        return _depth_detector()
+    return _network(word)
+
+
+def _depth_detector() -> KeypointDetector:
+    raise SourceError(
+        f'keypoints: expected {SOURCES}, found depth: this version has no embedded network')
+
+
+def _boxes_for(spec: str) -> KeypointDetector:
+    try:
+        return _depth_detector()
+    except SourceError:
+        raise SourceError(
+            f'keypoints: expected something that finds people beside {spec}, which looks into '
+            "their boxes; found none: add a source with a comma, as in 'rtmo-m,rtmpose-m'"
+        ) from None
+
+
+def _json_detector(folder: Path | None) -> KeypointDetector:
+    from pop_core.keypoints.openpose_json import OpenPoseJsonDetector
+
+    if folder is None or not folder.is_dir():
+        found = 'none' if folder is None else f'{folder}, which is no folder'
+        raise SourceError(
+            f'keypoints: expected a folder of <stamp_ns>.json files (--keypoints-dir), '
+            f'found {found}')
+    return OpenPoseJsonDetector(folder)
+
+
+def _network(word: str) -> OnnxSource:
+    from pop_core.keypoints.decoders import DECODERS
+    from pop_core.keypoints.onnx_detector import source_of
+    from pop_core.keypoints.onnx_session import OnnxSession, load_network
+    from pop_ros.network_registry import find_entry, verified_network
+
+    before, _, after = word.rpartition('@')
+    decoder, name = (before, after) if before in DECODERS else (None, word)
+    entry = find_entry(name)
+    if entry is not None:
+        return source_of(OnnxSession(verified_network(entry), name), decoder or entry.decoder)
+    path = Path(name)
+    if path.suffix != '.onnx' or not path.is_file():
+        why = 'is not there' if not path.is_file() else 'does not end in .onnx'
+        raise SourceError(f'keypoints: expected {SOURCES}, found {path}, which {why}')
+    return source_of(load_network(path), decoder)

@@ -1,0 +1,136 @@
+"""Networks that others publish: where they are, what they must hash to, their licences.
+
+A network that was fetched is read again only if its SHA-256 is still that of what was verified.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from pop_core.errors import PopError
+from pop_core.retrieval.default_library import cache_folder
+
+HASH_DIGITS = 64
+
+
+class NetworkFileError(PopError):
+    """A published network that is not there, or not the one that was published."""
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkEntry:
+    """A network of the registry.
+
+    Args:
+        name: What the user calls it.
+        url: Where its publisher has it.
+        sha256: Of the download, as its publisher says; None where nobody does.
+        size: Bytes of the download, None where unknown.
+        member: Name of the network in the archive that is downloaded, None if it is no archive.
+        licence: SPDX name of the weights' licence.
+        decoder: What reads its outputs.
+        about: What it is, in a sentence.
+        evidence: Who says what it hashes to.
+    """
+
+    name: str
+    url: str
+    sha256: str | None
+    size: int | None
+    member: str | None
+    licence: str
+    decoder: str
+    about: str
+    evidence: str
+
+    @property
+    def path(self) -> Path:
+        """Return where the network is cached."""
+        return networks_folder() / f'{self.name}.onnx'
+
+    @property
+    def record(self) -> Path:
+        """Return where is written what was verified."""
+        return self.path.with_suffix('.json')
+
+
+def networks_folder() -> Path:
+    """Return the folder of fetched networks."""
+    return cache_folder() / 'networks'
+
+
+@cache
+def load_registry(path: Path | None = None) -> tuple[NetworkEntry, ...]:
+    """Return the networks of the registry.
+
+    Args:
+        path: A file in place of the package's own.
+    """
+    source = files('pop_ros') / 'data' / 'networks.json' if path is None else path
+    document = json.loads(source.read_text(encoding='utf-8'))
+    return tuple(NetworkEntry(**entry) for entry in document['networks'])
+
+
+def find_entry(name: str) -> NetworkEntry | None:
+    """Return the network of that name, or None."""
+    return next((entry for entry in load_registry() if entry.name == name), None)
+
+
+def known_entry(name: str) -> NetworkEntry:
+    """Return the network of that name.
+
+    Raises:
+        NetworkFileError: If there is none.
+    """
+    entry = find_entry(name)
+    if entry is None:
+        names = ', '.join(entry.name for entry in load_registry())
+        raise NetworkFileError(f'expected a network of {names}, found {name}')
+    return entry
+
+
+def verified_network(entry: NetworkEntry) -> bytes:
+    """Return a fetched network, which is the one that was verified.
+
+    Raises:
+        NetworkFileError: If it was not fetched, or is not that one any more.
+    """
+    try:
+        content = entry.path.read_bytes()
+        recorded = json.loads(entry.record.read_text(encoding='utf-8'))
+    except (OSError, ValueError):
+        raise NetworkFileError(
+            f'{entry.name}: expected {entry.path}, found none: run `pop models fetch '
+            f'{entry.name}`') from None
+    wanted = _wanted(entry, recorded)
+    found = hashlib.sha256(content).hexdigest()
+    if wanted is None or found != wanted:
+        raise NetworkFileError(
+            f'{entry.path}: expected SHA-256 {wanted}, found {found}: it was changed after it was '
+            f'fetched; run `pop models fetch {entry.name}`')
+    return content
+
+
+def save_record(entry: NetworkEntry, content: bytes, download_sha256: str) -> None:
+    """Write down what was verified: the network, and the download that it came with."""
+    digest = hashlib.sha256(content).hexdigest()
+    document = {'sha256': digest, 'download_sha256': download_sha256, 'url': entry.url}
+    entry.record.write_text(json.dumps(document) + '\n', encoding='utf-8')
+
+
+def _wanted(entry: NetworkEntry, recorded: Any) -> str | None:
+    """Return the hash that a cached network must have; None if its record is not of this entry."""
+    if not isinstance(recorded, dict):
+        return None
+    sha256, download = recorded.get('sha256'), recorded.get('download_sha256')
+    if not isinstance(sha256, str) or len(sha256) != HASH_DIGITS:
+        return None
+    if entry.sha256 is not None and download != entry.sha256:
+        return None
+    return sha256 if entry.member is not None else str(download)
