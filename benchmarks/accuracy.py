@@ -94,9 +94,10 @@ def parse(argv: list[str]) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
-def parse_settings(pairs: list[str]) -> dict[str, Value]:
-    """Return `NAME=VALUE` texts as settings, each of its setting's own type."""
-    kinds = {item.name: type(item.default) for item in list_settings(PipelineConfig())}
+def parse_settings(pairs: list[str], config: object | None = None) -> dict[str, Value]:
+    """Return `NAME=VALUE` texts as settings of a configuration, each of its own type."""
+    listed = list_settings(PipelineConfig() if config is None else config)
+    kinds = {item.name: type(item.default) for item in listed}
     values: dict[str, Value] = {}
     for pair in pairs:
         name, _, text = pair.partition('=')
