@@ -8,7 +8,7 @@ carry it to the velocities.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -112,6 +112,17 @@ def update(
     return FilterState(
         fitted, predicted.velocity + gain @ moved, covariance, covariance @ gain.T,
         _symmetric(predicted.velocity_covariance - gain @ lost @ gain.T))
+
+
+def with_known_shape(state: FilterState, known: FilterState, model: BodyModel) -> FilterState:
+    """Return a belief of a new pose that also holds what is known of the person's shape."""
+    shape = slice(N_MOVING, None)
+    information = np.zeros_like(state.covariance)
+    information[shape, shape] = inverse(known.covariance[shape, shape])
+    covariance = inverse(inverse(state.covariance) + information)
+    step = covariance @ information @ difference(known.parameters, state.parameters)
+    parameters = increment(state.parameters, step, pose_skeleton(model, state.parameters))
+    return replace(state, parameters=parameters, covariance=covariance)
 
 
 def difference(

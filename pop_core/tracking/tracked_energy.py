@@ -8,26 +8,41 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import cholesky
 
-from pop_core.body.model import BodyParameters
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.energy import BodyEnergy, PriorBelief, TermWeights
 from pop_core.fitting.levenberg_marquardt import Residual, assemble
 from pop_core.fitting.observation import Observation
+from pop_core.fitting.priors import (
+    limit_prior_residual,
+    pose_prior_residual,
+    shape_prior_residual,
+)
 from pop_core.fitting.residuals import Pairs
+from pop_core.fitting.robust_loss import geman_mcclure_weight
 from pop_core.geometry.rotation import left_jacobian_inverse
 from pop_core.retrieval.pose_prior import PosePrior
 from pop_core.tracking.body_filter import FilterState, difference, inverse
 from pop_core.tracking.motion import N_MOVING
 
+SURE_SIGMAS = 2.0  # a joint may be found this far from its prediction, and be the joint
+
 
 class Prediction:
     """A predicted body as residual: whitened distance by the filter's covariance."""
 
-    def __init__(self, state: FilterState) -> None:
-        """Factorise the covariance of a predicted state."""
-        self.parameters: BodyParameters = state.parameters
-        self.information = inverse(state.covariance)
+    def __init__(self, predicted: FilterState, body: BodyState) -> None:
+        """Factorise the covariance of a predicted state.
+
+        Args:
+            predicted: The belief before the frame was looked at.
+            body: The predicted body.
+        """
+        self.parameters = predicted.parameters
+        self.information = inverse(predicted.covariance)
         self._root = cholesky(self.information, lower=False, check_finite=False)
+        J = body.landmark_jacobian()
+        variance = np.einsum('sax,sax->s', J @ predicted.covariance, J) / 3.0
+        self.landmark_sigma_m = np.sqrt(variance)
 
     def residual(self, state: BodyState, *, jacobian: bool) -> Residual:
         """Return L'(x - predicted) with L L' the predicted information."""
@@ -61,6 +76,7 @@ class TrackedEnergy:
         # The predicted body takes the place of the retrieved pose.
         belief = PriorBelief(prior, state.parameters.body_pose, np.ones(23))
         self._energy = BodyEnergy(state, observation, belief, weights, pairs)
+        self._energy.joint_weight = _joint_weight(state, observation, weights, prediction)
         self._prediction = prediction
 
     def residuals(self, state: BodyState, jacobian: bool) -> list[Residual]:
@@ -76,6 +92,32 @@ class TrackedEnergy:
         return Curvature(
             assemble([*blocks[:2], *blocks[6:]], size).hessian,
             assemble(blocks[2:6], size).hessian), blocks
+
+
+def prior_curvature(
+    state: BodyState, prior: PosePrior, weight: float
+) -> Float[np.ndarray, 'x x']:
+    """Return J'WJ of what is believed of any body."""
+    blocks = [
+        pose_prior_residual(state, prior, weight, jacobian=True),
+        limit_prior_residual(state, jacobian=True), shape_prior_residual(state, jacobian=True)]
+    return assemble(blocks, state.body.size).hessian
+
+
+def _joint_weight(
+    state: BodyState, observation: Observation, weights: TermWeights, prediction: Prediction
+) -> Float[np.ndarray, 's']:
+    """Return the robust weight 1/sigma^2 of every lifted joint, zero for the others.
+
+    The scale of the kernel grows with the doubt of the prediction: a limb that may be anywhere by
+    now listens to keypoints that are far away, one that was just seen does not.
+    """
+    lifted = observation.lifted
+    offset = np.where(
+        lifted.lifted[:, None], state.landmarks - lifted.positions_camera, 0.0)
+    scale_m = np.hypot(weights.robust_m, SURE_SIGMAS * prediction.landmark_sigma_m)
+    robust = geman_mcclure_weight(np.linalg.norm(offset, axis=1) / scale_m, 1.0)
+    return np.where(lifted.lifted, weights.joints * robust / lifted.sigma_m**2, 0.0)
 
 
 def _step_jacobian(step: Float[np.ndarray, 'x']) -> Float[np.ndarray, 'x x']:

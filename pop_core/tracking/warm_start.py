@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pop_core.fitting.body_fit import BodyFitter
+from pop_core.body.model import BodyParameters
+from pop_core.fitting.body_fit import BodyFit, BodyFitter
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.depth_consistency import (
     HidingPlaces,
@@ -30,8 +30,11 @@ from pop_core.fitting.residuals import Pairs, join_pairs
 from pop_core.tracking.body_filter import FilterState
 from pop_core.tracking.tracked_energy import Curvature, Prediction, TrackedEnergy
 
-# The robust kernel from the first to the last step [m]: a prediction is off by little.
-WIDEST_M, NARROWEST_M = 0.07, 0.03
+# The robust kernel from the first to the last step [m]: a prediction is off by little, unless
+# keypoints say otherwise.
+WIDE_M, WIDEST_M, NARROWEST_M = 0.07, 0.13, 0.03
+SURPRISE_M = 0.12  # keypoints this far from a predicted body need a wide kernel and more steps
+EXTRA_STEPS = 2
 JOINTS_WEIGHT = 0.3  # of keypoints beside a surface that was followed so far
 
 
@@ -67,7 +70,6 @@ class WarmFit:
         segment: Pixels of the observation that show the person.
         curvature: J'WJ of measurements and priors.
         energies: Final energies by name.
-        sighting: How much of the body is seen.
     """
 
     state: BodyState
@@ -75,7 +77,14 @@ class WarmFit:
     segment: Bool[np.ndarray, 'h w']
     curvature: Curvature
     energies: dict[str, float]
-    sighting: Sighting
+
+    def as_body_fit(
+        self, hessian: Float[np.ndarray, 'x x'], runners_up: tuple[BodyParameters, ...]
+    ) -> BodyFit:
+        """Return the fit as one of a single frame, with the curvature of all that is known."""
+        return BodyFit(
+            self.state.parameters, hessian, self.visibility, self.state, self.segment,
+            self.energies, runners_up)
 
 
 class WarmStart:
@@ -86,43 +95,50 @@ class WarmStart:
         self.fitter = fitter
 
     def fit(
-        self, predicted: FilterState, start: BodyState, observation: Observation, steps: int,
-        *, detected: bool,
+        self, predicted: FilterState, observation: Observation, steps: int, *, detected: bool,
+        loose: Bool[np.ndarray, '24'] | None = None,
     ) -> WarmFit:
-        """Return the body after some steps.
+        """Return the body after some steps from a prediction.
 
         Args:
-            predicted: What is believed of the body in this frame, as a residual.
-            start: Where the steps begin, on the coarse mesh.
+            predicted: What is believed of the body in this frame: where the steps begin, and a
+                residual in each of them.
             observation: What the sensor says.
             steps: How many steps.
             detected: Whether the observation holds keypoints of this frame.
+            loose: Limbs that follow keypoints alone until the last steps.
         """
-        prediction = Prediction(predicted)
+        state = self.fitter.coarse.state(predicted.parameters)
+        prediction = Prediction(predicted, state)
         weights = TermWeights(
             JOINTS_WEIGHT if detected else 0.0, self.fitter.config.prior_weight, 0.0)
-        state, damping = start, FIRST_DAMPING
+        surprised = loose is not None or (
+            detected and farthest_joint_m(state, observation) > SURPRISE_M)
+        scales_m = np.geomspace(
+            WIDEST_M if surprised else WIDE_M, NARROWEST_M, steps + EXTRA_STEPS * surprised)
+        damping = FIRST_DAMPING
+        active = np.ones(state.body.size, dtype=bool)
         visibility = see_body(state, observation)
         segment = self.fitter.steps.segment(visibility, observation)
         places = HidingPlaces(observation, segment, state.vertices[:, 2])
-        active = np.ones(state.body.size, dtype=bool)
-        for scale_m in np.geomspace(WIDEST_M, NARROWEST_M, steps):
+        for k, scale_m in enumerate(scales_m):
             pairs = self._pairs(state, observation, visibility, segment, places, float(scale_m))
+            if loose is not None and k < EXTRA_STEPS:
+                pairs = _without(pairs, loose[state.body.main_bone[pairs.vertex]])
             energy = TrackedEnergy(
                 state, observation, self.fitter.prior, weights, pairs, prediction)
             report = levenberg_marquardt_step(
                 state, energy.residuals, BodyState.moved, active, damping)
             state, damping = report.state, report.damping
             visibility = see_body(state, observation)
+            segment = self.fitter.steps.segment(visibility, observation)
         curvature, blocks = energy.curvature(state)
-        segment = self.fitter.steps.segment(visibility, observation)
         energies = {
             'E_J3D': cost_of(blocks[:1]), 'E_prior': cost_of(blocks[2:6]),
             'E_NN': cost_of(blocks[6:]),
             'E_depth': depth_energy(visibility, observation, segment),
         }
-        return WarmFit(
-            state, visibility, segment, curvature, energies, sighting(visibility))
+        return WarmFit(state, visibility, segment, curvature, energies)
 
     def _pairs(
         self, state: BodyState, observation: Observation, visibility: Visibility,
@@ -137,8 +153,17 @@ class WarmStart:
         return join_pairs(parts)
 
 
-def mean_distance_m(
-    joints: Float[np.ndarray, '24 3'], others: Sequence[Float[np.ndarray, '24 3']]
-) -> list[float]:
-    """Return the mean distance of joints to the same joints of other bodies [m]."""
-    return [float(np.linalg.norm(joints - other, axis=1).mean()) for other in others]
+def _without(pairs: Pairs, left_out: Bool[np.ndarray, 'n']) -> Pairs:
+    keep = ~left_out
+    return Pairs(
+        pairs.vertex[keep], pairs.direction[keep], pairs.target[keep], pairs.weight[keep])
+
+
+def farthest_joint_m(state: BodyState, observation: Observation) -> float:
+    """Return how far the farthest lifted joint lies from the body's [m], weighed by its score."""
+    lifted = observation.lifted
+    rows = lifted.lifted
+    if not rows.any():
+        return 0.0
+    offset = np.linalg.norm(state.landmarks[rows] - lifted.positions_camera[rows], axis=1)
+    return float((offset * lifted.scores[rows]).max())

@@ -1,0 +1,182 @@
+"""Following one tracked person into a frame: predict, fit, judge, update."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pop_core.estimate import BodyEstimate
+from pop_core.fitting.body_fit import BodyFit
+from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.depth_consistency import Visibility, see_body
+from pop_core.fitting.observation import Observation
+from pop_core.fitting.plausibility import plausibility
+from pop_core.keypoints.lifted_joints import LiftedJoints
+from pop_core.pipeline import BodyPipeline, PersonFit, Scene
+from pop_core.tracking.association import Expected
+from pop_core.tracking.body_filter import (
+    FilterState,
+    first_state,
+    inverse,
+    predict,
+    update,
+    with_known_shape,
+)
+from pop_core.tracking.limbs import contradicted_joints, limb_bones, loosened
+from pop_core.tracking.rivals import costs, follow_alternatives
+from pop_core.tracking.track import Alternative, PersonTrack
+from pop_core.tracking.track_view import observe_track
+from pop_core.tracking.tracked_energy import prior_curvature
+from pop_core.tracking.tracking_config import TrackingConfig
+from pop_core.tracking.warm_start import WarmFit, WarmStart, sighting
+
+MIN_SEEN = 0.04  # share of the body that must be seen for the frame to say anything of it
+CONTRADICTED = 0.4  # a body is not where the camera saw through this share of it
+USUAL_SHARE = 0.05  # how fast the usual E_depth follows
+UNUSUAL, UNUSUAL_M = 1.5, 0.01  # E_depth above this many times the usual and this much more
+TRUSTED_SUPPORT = 0.5
+
+
+class Follower:
+    """Follows people with the terms of one pipeline."""
+
+    def __init__(self, pipeline: BodyPipeline, config: TrackingConfig) -> None:
+        """Use a pipeline's model, fitter and settings."""
+        self.pipeline, self.config = pipeline, config
+        self.warm = WarmStart(pipeline.fitter)
+
+    def predict(self, track: PersonTrack, now_ns: int) -> None:
+        """Move a track's beliefs to the time of a frame."""
+        dt_s = (now_ns - track.now_ns) * 1e-9
+        track.now_ns = now_ns
+        track.filter = predict(track.filter, self.pipeline.model, dt_s)
+        for other in track.alternatives:
+            other.filter = predict(other.filter, self.pipeline.model, dt_s)
+
+    def expected(self, track: PersonTrack) -> Expected:
+        """Return where a predicted person should be."""
+        doubt_m = float(np.sqrt(np.trace(track.filter.covariance[:3, :3]) / 3.0))
+        return Expected(self._body(track.filter).landmarks, doubt_m, track.mask)
+
+    def follow(
+        self, track: PersonTrack, scene: Scene, lifted: LiftedJoints | None
+    ) -> BodyEstimate | None:
+        """Return the person in a frame, or None where nothing is given out.
+
+        Args:
+            track: A predicted track; moved on.
+            scene: The frame, with what nearer people explain.
+            lifted: The person's joints if they were detected in this frame.
+        """
+        start = self._body(track.filter)
+        observation = observe_track(
+            scene.frame, scene.ground, scene.taken, start, track.joint_state, lifted)
+        visibility = see_body(start, observation)
+        if sighting(visibility).seen < MIN_SEEN and lifted is None:
+            return self._coast(track, scene, start, visibility)
+        fit = self._fit(track, observation, lifted)
+        sight = sighting(fit.visibility)
+        if sight.seen < MIN_SEEN or sight.contradicted > CONTRADICTED + sight.seen:
+            return self._coast(track, scene, start, visibility)
+        return self._accept(track, scene, fit, lifted)
+
+    def restart(self, track: PersonTrack, person: PersonFit) -> None:
+        """Take over a fit that began with retrieved poses; the shape stays the person's."""
+        assert person.fit is not None
+        found = first_state(person.fit.parameters, person.fit.hessian)
+        track.filter = with_known_shape(found, track.filter, self.pipeline.model)
+        self.begin(track, person)
+        track.depth_level = None
+
+    def begin(self, track: PersonTrack, person: PersonFit) -> None:
+        """Keep the other explanations of a fresh fit while they may be true."""
+        assert person.fit is not None
+        track.restarted_ns = track.now_ns
+        track.doubts, track.is_doubtful = 0, False
+        track.alternatives = [
+            Alternative(first_state(other, person.fit.hessian), 0.0, track.now_ns)
+            for other in person.fit.runners_up[: self.config.hypotheses - 1]]
+
+    def _fit(
+        self, track: PersonTrack, observation: Observation, lifted: LiftedJoints | None
+    ) -> WarmFit:
+        """Return the best explanation of the person in a frame, and the belief it began with."""
+        steps, detected = self.config.steps, lifted is not None
+        fit = self.warm.fit(track.filter, observation, steps, detected=detected)
+        if lifted is not None:
+            fit = self._without_lost_limbs(track, fit, observation, lifted)
+        if track.alternatives:
+            fit = follow_alternatives(
+                self.warm, track, fit, observation, self.config, detected=detected)
+        return fit
+
+    def _without_lost_limbs(
+        self, track: PersonTrack, fit: WarmFit, observation: Observation, lifted: LiftedJoints
+    ) -> WarmFit:
+        """Look anew for limbs that keypoints contradict; return the better explanation."""
+        loose = limb_bones(contradicted_joints(fit.state, lifted))
+        if not loose.any():
+            return fit
+        free = loosened(track.filter, loose)
+        other = self.warm.fit(
+            free, observation, self.config.steps, detected=True, loose=loose)
+        ours, theirs = costs(self.warm.fitter, [fit, other], observation)
+        if theirs >= ours:
+            return fit
+        track.filter = free
+        return other
+
+    def _accept(
+        self, track: PersonTrack, scene: Scene, fit: WarmFit, lifted: LiftedJoints | None
+    ) -> BodyEstimate | None:
+        """Update a track by a fit and return the person."""
+        track.filter = update(track.filter, fit.state.parameters, fit.curvature.data)
+        hessian = inverse(track.filter.covariance) + fit.curvature.prior
+        body = fit.as_body_fit(
+            hessian, tuple(other.filter.parameters for other in track.alternatives))
+        if lifted is not None:
+            track.trust = plausibility(body, lifted)
+        estimate, support = self.pipeline.estimate(scene, body, track.trust)
+        self._judge(track, fit, support, lifted)
+        track.note_seen(estimate, self.config)
+        if support < self.pipeline.config.min_support:
+            track.note_unseen(False, self.config)
+            return None
+        return replace(estimate, track=track.tag())
+
+    def _judge(
+        self, track: PersonTrack, fit: WarmFit, support: float, lifted: LiftedJoints | None
+    ) -> None:
+        """Note whether a fit is worse than it used to be, or against its keypoints."""
+        depth_m = fit.energies['E_depth']
+        usual_m = depth_m if track.depth_level is None else track.depth_level
+        unusual = depth_m > UNUSUAL * usual_m + UNUSUAL_M
+        if not unusual:
+            track.depth_level = (1.0 - USUAL_SHARE) * usual_m + USUAL_SHARE * depth_m
+        track.is_doubtful = unusual or support < TRUSTED_SUPPORT
+        if lifted is not None:
+            against = contradicted_joints(fit.state, lifted).any()
+            track.doubts = track.doubts + 1 if track.is_doubtful or against else 0
+
+    def _coast(
+        self, track: PersonTrack, scene: Scene, state: BodyState, visibility: Visibility
+    ) -> BodyEstimate | None:
+        """Return a person nothing is seen of, where they should be; None for the lost."""
+        track.alternatives.clear()
+        track.note_unseen(sighting(visibility).contradicted < CONTRADICTED, self.config)
+        if not track.is_shown:
+            return None
+        config = self.pipeline.config.fitting
+        hessian = inverse(track.filter.covariance) + prior_curvature(
+            state, self.pipeline.fitter.prior, config.prior_weight)
+        body = BodyFit(
+            state.parameters, hessian, visibility, state, visibility.rendered.covered, {}, ())
+        estimate, _ = self.pipeline.estimate(scene, body, track.trust)
+        track.joint_state = estimate.joint_state
+        return replace(
+            estimate, mask=np.zeros_like(estimate.mask), track=track.tag(),
+            score=track.trust * float(np.exp(-track.unseen_s)))
+
+    def _body(self, belief: FilterState) -> BodyState:
+        return self.pipeline.fitter.coarse.state(belief.parameters)

@@ -1,0 +1,50 @@
+"""Limbs that keypoints contradict: they are let go and looked for anew.
+
+A limb hidden at first may be followed where it is not, along the trunk say, and there looks well
+observed. Only a keypoint tells.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from pop_core.body.joints import JOINT_INDEX, N_JOINTS, SHARED_NAMES
+from pop_core.fitting.body_state import BodyState
+from pop_core.keypoints.lifted_joints import LiftedJoints
+from pop_core.tracking.body_filter import FilterState
+
+STRANGE_M = 0.18  # a keypoint this far from the body, and surely lifted, contradicts it
+SURE_SCORE = 0.55
+SIGMAS = 4.0
+LOOSE_RAD = 0.8
+ARM, LEG = ('collar', 'shoulder', 'elbow', 'wrist'), ('hip', 'knee', 'ankle')
+LIMB_OF = {'elbow': ARM, 'wrist': ARM, 'knee': LEG, 'ankle': LEG}
+
+
+def contradicted_joints(body: BodyState, lifted: LiftedJoints) -> Bool[np.ndarray, 's']:
+    """Return the shared joints that are surely lifted far from where the body has them."""
+    offset = np.linalg.norm(body.landmarks - lifted.positions_camera, axis=1)
+    with np.errstate(invalid='ignore'):
+        far = offset > np.maximum(STRANGE_M, SIGMAS * lifted.sigma_m)
+    return lifted.lifted & far & (lifted.scores >= SURE_SCORE)
+
+
+def limb_bones(contradicted: Bool[np.ndarray, 's']) -> Bool[np.ndarray, '24']:
+    """Return the joints of the limbs that contradicted joints belong to; none of the trunk."""
+    out = np.zeros(N_JOINTS, dtype=bool)
+    for row in np.flatnonzero(contradicted):
+        side, _, kind = SHARED_NAMES[row].partition('_')
+        for part in LIMB_OF.get(kind, ()):
+            out[JOINT_INDEX[f'{side}_{part}']] = True
+    return out
+
+
+def loosened(predicted: FilterState, bones: Bool[np.ndarray, '24']) -> FilterState:
+    """Return a belief in which some joints may have any rotation within reach."""
+    turns = np.repeat(np.where(bones, LOOSE_RAD, 0.0), 3)
+    extra: Float[np.ndarray, 'x'] = np.zeros(len(predicted.covariance))
+    extra[3: 3 + len(turns)] = turns
+    return replace(predicted, covariance=predicted.covariance + np.diag(extra**2))

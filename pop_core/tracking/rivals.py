@@ -1,0 +1,75 @@
+"""Explanations of one person that compete: which is best, and which are still worth following."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool
+
+from pop_core.fitting.body_fit import BodyFitter
+from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.energy import PriorBelief
+from pop_core.fitting.hypotheses import Hypothesis
+from pop_core.fitting.observation import Observation
+from pop_core.tracking.body_filter import update
+from pop_core.tracking.track import Alternative, PersonTrack
+from pop_core.tracking.tracking_config import TrackingConfig
+from pop_core.tracking.warm_start import WarmFit, WarmStart
+
+SAME_M = 0.04  # explanations nearer to each other than this, mean over joints, are one
+DECIDED = 40.0  # summed cost that decides between two of them
+BETTER = 8.0  # summed cost by which another must be better to take over
+LARGEST = 10.0  # of one frame: no single frame decides
+
+
+def costs(
+    fitter: BodyFitter, fits: Sequence[WarmFit], observation: Observation
+) -> list[float]:
+    """Return the cost of each body by E_depth, keypoints and priors, on common pixels."""
+    hypotheses = [
+        Hypothesis(
+            fit.state, PriorBelief(fitter.prior, fit.state.parameters.body_pose, np.ones(23)))
+        for fit in fits]
+    common: Bool[np.ndarray, 'h w'] = np.mean([fit.segment for fit in fits], axis=0) >= 0.5
+    fitter.steps.score(hypotheses, observation, common)
+    return [hypothesis.cost for hypothesis in hypotheses]
+
+
+def distance_m(state: BodyState, other: BodyState) -> float:
+    """Return the mean distance between the joints of two bodies [m]."""
+    return float(np.linalg.norm(state.joints - other.joints, axis=1).mean())
+
+
+def follow_alternatives(
+    warm: WarmStart, track: PersonTrack, best: WarmFit, observation: Observation,
+    config: TrackingConfig, *, detected: bool,
+) -> WarmFit:
+    """Follow the other explanations of a person; return the one that is best by now.
+
+    Those that became the same as the best, or that evidence or time decided against, are dropped.
+    When another takes over, its belief becomes the track's, and the old best is dropped.
+    """
+    kept = []
+    winner = best
+    for other in track.alternatives:
+        fit = warm.fit(other.filter, observation, 1, detected=detected)
+        ours, theirs = costs(warm.fitter, [best, fit], observation)
+        other.excess += float(np.clip(theirs - ours, -LARGEST, LARGEST))
+        if other.excess < -BETTER:
+            track.filter, winner = other.filter, fit
+            continue
+        other.filter = update(other.filter, fit.state.parameters, fit.curvature.data)
+        age_s = (track.now_ns - other.born_ns) * 1e-9
+        is_open = other.excess < DECIDED and age_s <= config.undecided_s
+        if is_open and distance_m(fit.state, best.state) > SAME_M:
+            kept.append(other)
+    track.alternatives = kept
+    return winner
+
+
+def alternatives_of(
+    beliefs: Sequence[Alternative], config: TrackingConfig
+) -> list[Alternative]:
+    """Return as many alternatives as may be followed."""
+    return list(beliefs[: config.hypotheses - 1])
