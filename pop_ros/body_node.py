@@ -1,4 +1,4 @@
-"""The node `pop` itself: inputs, worker, outputs, parameters, services, diagnostics.
+"""The node `pop` itself: life cycle, inputs, worker, outputs, parameters, services, diagnostics.
 
 Callbacks only store; one worker thread fits the newest pair and publishes. The executor is
 single-threaded because rclpy's multi-threaded one spends a core on waiting.
@@ -6,109 +6,154 @@ single-threaded because rclpy's multi-threaded one spends a core on waiting.
 
 from __future__ import annotations
 
-import threading
-import time
+from pathlib import Path
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
-from rclpy.node import Node
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_srvs.srv import SetBool, Trigger
 
-from pop_core.body.model import BodyModel
 from pop_core.config import PipelineConfig
 from pop_core.errors import PopError
-from pop_ros.body_messages import OUTPUT_TYPES, TF
-from pop_ros.diagnostics import diagnostic_array
-from pop_ros.explanation import explain_missing_pairs
-from pop_ros.frame_fitter import FrameFitter
-from pop_ros.from_messages import stamp_ns
+from pop_ros.frame_work import FrameWork
+from pop_ros.health import NodeHealth
 from pop_ros.inputs import RgbdInputs, RgbdMessages
 from pop_ros.node_arguments import SourceArguments
 from pop_ros.node_config import NodeConfig
+from pop_ros.node_outputs import NodeOutputs
 from pop_ros.parameters import ConfigParameters
-from pop_ros.pop_messages import model_message, pop_msgs
-from pop_ros.qos import output_qos, static_tf_qos
+from pop_ros.qos import static_tf_qos
 from pop_ros.static_frames import StaticFrames
-from pop_ros.statistics import NodeStatistics, Snapshot, drop_reason
+from pop_ros.statistics import NodeStatistics
 from pop_ros.tf_messages import tf2_msgs
-from pop_ros.to_messages import make_header
-from pop_ros.worker import Worker
 
 POLL_S = 0.05
 FOLLOW_S = 0.25
 REPORT_S = 1.0
-SILENCE_S = 5.0
-PROGRESS_STEP = 0.1
 STOP_S = 5.0  # patience with the frame in work at shutdown
-REPLACED = 'replaced by a newer pair'
 
 
-class PopNode(Node):
-    """Fits people to paired RGB-D images and publishes them."""
+class PopNode(LifecycleNode):
+    """Fits people to paired RGB-D images and publishes them.
+
+    Unconfigured it has parameters only; configuring loads keypoint source, body and library;
+    active it subscribes the camera and works for whoever listens.
+    """
 
     def __init__(self, arguments: SourceArguments) -> None:
-        """Declare parameters and publishers; inputs are subscribed once the worker is ready.
+        """Declare parameters, topics and services.
 
         Raises:
             SettingError: If a parameter given at start does not fit.
         """
         super().__init__('pop')
         self.log = self.get_logger()  # type: ignore[no-untyped-call]
-        self.failure: Exception | None = None
+        self.refusal: PopError | None = None
         self._arguments = arguments
-        self._changed, self._restart = threading.Event(), threading.Event()
+        self._work: FrameWork | None = None
+        self._is_active = False
         self._settings = ConfigParameters(
             self, NodeConfig(), PipelineConfig(), self._on_settings)
         self._statistics = NodeStatistics()
-        self._previous: Snapshot | None = None
-        self._trouble = ''
-        self._said_share = 0.0
-        self._fitter: FrameFitter | None = None
         self._frames = StaticFrames()
         if tf2_msgs is not None:
             self.create_subscription(
                 tf2_msgs.TFMessage, '/tf_static', self._frames.add_message, static_tf_qos())
-        self._inputs = RgbdInputs(self, self._config.sync.slop_s, self._on_frame)
-        self._outputs = {
-            name: self.create_publisher(
-                kind, '/tf' if name == TF else f'~/{name}', output_qos(),
-                qos_overriding_options=QoSOverridingOptions.with_default_policies())
-            for name, kind in OUTPUT_TYPES.items()
-        }
-        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._inputs = RgbdInputs(self, self.config.sync.slop_s, self._on_frame)
+        self._outputs = NodeOutputs(self)
+        self._health = NodeHealth(self, self._inputs, self._statistics)
         self.create_service(SetBool, '~/enable', self._on_enable)
         self.create_service(Trigger, '~/reset', self._on_reset)
-        self._worker: Worker[RgbdMessages] = Worker(self._fit, self._on_error, self._prepare)
-        self._worker.start()
-        self._warn_of_missing_tf()
+        self.create_service(Trigger, '~/snapshot', self._on_snapshot)
         # Steady timers: a simulated clock that stands still must not silence the node.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(POLL_S, self._inputs.poll, clock=steady)
         self.create_timer(FOLLOW_S, self._follow, clock=steady)
         self.create_timer(REPORT_S, self._report, clock=steady)
 
-    def stop(self) -> bool:
-        """End the worker; return whether the frame in work was finished in time."""
-        return self._worker.stop(STOP_S)
-
     @property
-    def _config(self) -> NodeConfig:
+    def config(self) -> NodeConfig:
+        """Return the node's settings as they are now."""
         return self._settings.node_config
 
-    # Executor thread
+    @property
+    def failure(self) -> Exception | None:
+        """Return what makes it pointless to go on, or None."""
+        return self._work.failure if self._work is not None else None
+
+    def start(self) -> None:
+        """Configure and activate, unless a manager of life cycles is to do it.
+
+        Raises:
+            PopError: If the keypoint source is not there.
+        """
+        if not self.config.autostart:
+            self.log.info('unconfigured: waiting for a manager of life cycles')
+            return
+        self.trigger_configure()  # type: ignore[no-untyped-call]
+        if self.refusal is not None:
+            raise self.refusal
+        self.trigger_activate()  # type: ignore[no-untyped-call]
+
+    def stop(self) -> bool:
+        """End the worker; return whether the frame in work was finished in time."""
+        work, self._work = self._work, None
+        return True if work is None else work.stop(STOP_S)
+
+    # Life cycle; rclpy takes an exception for an error and says nothing of it.
+
+    def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """Check the keypoint source, then load and compile in the worker's thread."""
+        try:
+            detector = self._arguments.detector()
+        except PopError as error:
+            self.refusal = error
+            self.log.error(f'not configured: {error}')
+            return TransitionCallbackReturn.FAILURE
+        self.refusal = None
+        for text in self._outputs.missing:
+            self.log.info(text)
+        self._work = FrameWork(
+            self, self._settings, detector, self._frames, self._outputs, self._statistics)
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_activate(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """Subscribe the camera as soon as somebody listens."""
+        self._is_active = True
+        self._follow()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_deactivate(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """Unsubscribe, and remove the people that are shown."""
+        self._is_active = False
+        self._follow()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_cleanup(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """Forget what was loaded."""
+        return self._end_work()
+
+    def on_shutdown(self, _state: LifecycleState) -> TransitionCallbackReturn:
+        """End the work; the process stays until it is told to end."""
+        self._is_active = False
+        return self._end_work()
+
+    def _end_work(self) -> TransitionCallbackReturn:
+        self._inputs.leave()
+        if self.stop():
+            return TransitionCallbackReturn.SUCCESS
+        self.log.error(f'the frame in work did not end within {STOP_S:.0f} s')
+        return TransitionCallbackReturn.ERROR
+
+    # Services and parameters
 
     def _on_settings(self) -> None:
-        self._changed.set()
-        self._warn_of_missing_tf()
-        if round(self._config.sync.slop_s * 1e9) != self._inputs.pairer.slop_ns:
-            self._inputs.reset(self._config.sync.slop_s)
-
-    def _warn_of_missing_tf(self) -> None:
-        if self._config.tf.frames != 'off' and TF not in self._outputs:
-            self.log.warning('tf.frames: tf2_msgs is not installed, nothing goes to /tf')
+        if self._work is not None:
+            self._work.configure()
+        if round(self.config.sync.slop_s * 1e9) != self._inputs.pairer.slop_ns:
+            self._inputs.reset(self.config.sync.slop_s)
+        self._follow()
 
     def _on_enable(
         self, request: SetBool.Request, response: SetBool.Response
@@ -119,102 +164,44 @@ class PopNode(Node):
         return response
 
     def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._inputs.reset(self._config.sync.slop_s)
-        self._restart.set()
+        self._inputs.reset(self.config.sync.slop_s)
+        if self._work is not None:
+            self._work.reset()
         response.success, response.message = True, 'pending images dropped, ids start anew'
         return response
 
+    async def _on_snapshot(
+        self, _: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        if self._work is None:
+            response.success, response.message = False, 'the node is not configured'
+            return response
+        written = self._work.snapshot(Path(self.config.snapshot.folder))
+        response.success, response.message = await written
+        return response
+
+    # Timers and inputs
+
     def _follow(self) -> None:
         """Subscribe while the worker is ready and somebody listens."""
-        if self._fitter is None:
+        if self._work is None:
             return
-        if self._is_wanted():
-            self._inputs.follow(self._config.input.reliability)
+        self._work.run(self._is_active and self.config.enabled)
+        if self._work.is_ready and self._is_wanted():
+            self._inputs.follow(self.config.input.reliability)
         else:
             self._inputs.leave()
 
     def _is_wanted(self) -> bool:
-        return self._config.enabled and (not self._config.lazy or bool(self._wanted()))
-
-    def _wanted(self) -> list[str]:
-        tf_off = {TF} if self._config.tf.frames == 'off' else set()
-        return [
-            name for name, publisher in self._outputs.items() if name not in tf_off
-            and (not self._config.lazy or publisher.get_subscription_count())]
+        is_on = self._is_active and self.config.enabled
+        return is_on and (not self.config.lazy or bool(self._outputs.wanted(self.config)))
 
     def _on_frame(self, messages: RgbdMessages) -> None:
-        self._statistics.add_pair()
-        if self._worker.mailbox.put(messages):
-            self._statistics.add_drop(REPLACED, 'the worker was busy with an older pair')
+        if self._work is not None:
+            self._work.put(messages)
 
     def _report(self) -> None:
-        reports = self._inputs.reports()
-        silence_s = time.monotonic() - self._inputs.last_frame_s
-        waits = self._fitter is not None and self._is_wanted() and silence_s > SILENCE_S
-        trouble = (
-            explain_missing_pairs(reports, self._inputs.pairer, silence_s) if waits else '')
-        if trouble and not self._trouble:
-            self.log.warning(trouble)
-        self._trouble = trouble
-        snapshot = self._statistics.snapshot()
-        self._diagnostics.publish(diagnostic_array(
-            make_header(self.get_clock().now().nanoseconds, ''),
-            self.get_fully_qualified_name(), snapshot, previous=self._previous,
-            pairer=self._inputs.pairer, reports=reports, trouble=trouble))
-        self._previous = snapshot
-
-    # Worker thread
-
-    def _prepare(self) -> None:
-        started_s = time.monotonic()
-        self.log.info(
-            f'preparing (keypoints: {self._arguments.keypoints}); the first start generates the '
-            'pose library and compiles kernels, later ones read them from the cache')
-        fitter = FrameFitter(
-            self._arguments, self._settings.pipeline_config, self._config,
-            self._say_progress, self._frames)
-        self._fitter = fitter
-        self._publish_model(fitter.model)
-        self.log.info(f'ready after {time.monotonic() - started_s:.1f} s')
-
-    def _publish_model(self, model: BodyModel) -> None:
-        """Latch what a receiver of ~/bodies needs to know, where pop_msgs is installed."""
-        if pop_msgs is None:
-            self.log.info('pop_msgs is not installed: no ~/bodies and no ~/body_model')
-            return
-        header = make_header(self.get_clock().now().nanoseconds, '')
-        publisher = self.create_publisher(
-            pop_msgs.BodyModel, '~/body_model', output_qos(latched=True))
-        publisher.publish(model_message(model, header))
-
-    def _say_progress(self, share: float, sentence: str) -> None:
-        if share >= self._said_share + PROGRESS_STEP:
-            self._said_share = share
-            self.log.info(f'{share:.0%} {sentence}')
-
-    def _fit(self, messages: RgbdMessages) -> None:
-        assert self._fitter is not None
-        if self._changed.is_set():
-            self._changed.clear()
-            self._fitter.configure(self._settings.pipeline_config, self._config)
-        if self._restart.is_set():
-            self._restart.clear()
-            self._fitter.reset()
-        fitted = self._fitter.fit(
-            messages.color, messages.depth, messages.info, messages.depth_info,
-            wanted=self._wanted())
-        for name, message in fitted.outputs:
-            self._outputs[name].publish(message)
-        latency_ms = (time.monotonic() - messages.arrival_s) * 1e3
-        age_ms = (self.get_clock().now().nanoseconds - stamp_ns(messages.color.header)) / 1e6
-        result = fitted.result
-        self._statistics.add_frame(len(result.bodies), latency_ms, age_ms, result.times_ms)
-
-    def _on_error(self, error: Exception) -> None:
-        if self._fitter is None:
-            self.failure = error
-            return
-        reason = drop_reason(error)
-        if self._statistics.add_drop(reason, str(error)):
-            say = self.log.warning if isinstance(error, PopError) else self.log.error
-            say(f'frame dropped ({reason}): {error}')
+        doing = '' if self._work is None else self._work.doing
+        waits = self._work is not None and self._work.is_ready and self._is_wanted()
+        _, state = self._state_machine.current_state
+        self._health.report(self.config.diagnostics, state=state, doing=doing, waits=waits)

@@ -9,12 +9,13 @@ from typing import Any
 from pop_core.body.model import BodyModel
 from pop_core.config import PipelineConfig
 from pop_core.estimate import FrameResult
+from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.pipeline import BodyPipeline
+from pop_core.rgbd import RgbdFrame
 from pop_ros.body_messages import RECORDED_TYPES, BodyMessages, Output
 from pop_ros.frame_maker import FrameMaker
-from pop_ros.node_arguments import SourceArguments
 from pop_ros.node_config import NodeConfig
-from pop_ros.sources import make_detector, make_pipeline
+from pop_ros.sources import make_pipeline
 from pop_ros.static_frames import StaticFrames, parse_extrinsics
 
 
@@ -23,10 +24,12 @@ class FittedFrame:
     """What became of one frame.
 
     Args:
+        frame: The frame itself.
         result: The pipeline's result.
         outputs: Messages by topic.
     """
 
+    frame: RgbdFrame
     result: FrameResult
     outputs: list[Output]
 
@@ -36,13 +39,13 @@ class FrameFitter:
 
     def __init__(
         self,
-        arguments: SourceArguments,
+        detector: KeypointDetector,
         pipeline_config: PipelineConfig,
         config: NodeConfig,
         progress: Callable[[float, str], None] | None = None,
         frames: StaticFrames | None = None,
     ) -> None:
-        """Load the keypoint source, body model and pose library.
+        """Load body model and pose library, and compile kernels.
 
         `progress` is told a share 0..1 and a sentence while a first library is generated;
         `frames` knows where a depth camera with a frame of its own stands.
@@ -50,8 +53,6 @@ class FrameFitter:
         Raises:
             PopError: If one of them cannot be loaded.
         """
-        detector = make_detector(
-            arguments.keypoints, arguments.keypoints_dir, arguments.decoder)
         self._pipeline = make_pipeline(detector, pipeline_config, progress=progress)
         self._messages = BodyMessages(self._pipeline.model, config)
         self._maker = FrameMaker(frames or StaticFrames())
@@ -74,6 +75,18 @@ class FrameFitter:
         """Start the ids of people anew."""
         self._messages.reset()
 
+    def clear(self, wanted: Collection[str]) -> list[Output]:
+        """Return the messages that remove everybody who is shown."""
+        return self._messages.clear(wanted)
+
+    def detect(self, frame: RgbdFrame) -> list[Detection]:
+        """Return the keypoints of a frame.
+
+        Raises:
+            PopError: If the keypoint source cannot read what it needs for this frame.
+        """
+        return self._pipeline.detector.detect(frame)
+
     def fit(
         self, color: Any, depth: Any, info: Any, depth_info: Any = None,
         *, wanted: Collection[str] = tuple(RECORDED_TYPES),
@@ -87,4 +100,4 @@ class FrameFitter:
         frame = self._maker.make(color, depth, info, depth_info)
         result = self._pipeline.process(frame)
         outputs = self._messages.build(result, frame, color.header.frame_id, wanted)
-        return FittedFrame(result, outputs)
+        return FittedFrame(frame, result, outputs)

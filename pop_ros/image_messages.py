@@ -5,6 +5,7 @@ from __future__ import annotations
 import array
 
 import numpy as np
+from jaxtyping import Float32, UInt16
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
@@ -18,8 +19,13 @@ def color_message(rgb: np.ndarray, header: Header) -> Image:
 
 def depth_message(depth_m: np.ndarray, header: Header) -> Image:
     """Return a 16UC1 image in millimetres, 0 where nothing was measured (REP 118)."""
+    return _image(depth_mm(depth_m), '16UC1', header)
+
+
+def depth_mm(depth_m: Float32[np.ndarray, 'h w']) -> UInt16[np.ndarray, 'h w']:
+    """Return depth as 16UC1 stores it: whole millimetres, 0 where nothing was measured."""
     millimetres = np.nan_to_num(np.rint(depth_m * 1000), nan=0.0)
-    return _image(np.clip(millimetres, 0, 65535).astype('<u2'), '16UC1', header)
+    return np.clip(millimetres, 0, 65535).astype('<u2')
 
 
 def info_message(camera: Camera, header: Header) -> CameraInfo:

@@ -8,30 +8,32 @@ import sys
 import threading
 from collections.abc import Sequence
 from types import FrameType
+from typing import TYPE_CHECKING
 
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
-
-from pop_core.errors import PopError
-from pop_ros.body_node import PopNode
-from pop_ros.node_arguments import SourceArguments, parse_arguments
+if TYPE_CHECKING:
+    from pop_ros.node_arguments import SourceArguments
 
 OK, FAILED, BAD_USAGE = 0, 1, 2
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; return the process's exit code."""
-    argv = list(sys.argv if argv is None else ['pop_node', *argv])
-    arguments = parse_arguments(remove_ros_args(argv)[1:])
     stopping = threading.Event()
 
     def on_signal(_number: int, _frame: FrameType | None) -> None:
         stopping.set()
 
+    # Before the imports, which take a second: whoever stops the node in it gets a clean end too.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.utilities import remove_ros_args
+
+    from pop_ros.node_arguments import parse_arguments
+
+    argv = list(sys.argv if argv is None else ['pop_node', *argv])
+    arguments = parse_arguments(remove_ros_args(argv)[1:])
     # The first matching rule wins, so that the user's own remappings come before the preset's.
     rclpy.init(
         args=argv + arguments.as_remappings(), signal_handler_options=SignalHandlerOptions.NO)
@@ -42,8 +44,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: SourceArguments, stopping: threading.Event) -> int:
+    from rclpy.executors import SingleThreadedExecutor
+
+    from pop_core.errors import PopError
+    from pop_ros.body_node import PopNode
+
     try:
         node = PopNode(arguments)
+        node.start()
     except PopError as error:
         sys.stderr.write(f'pop node: {error}\n')
         return BAD_USAGE
@@ -52,11 +60,11 @@ def _run(arguments: SourceArguments, stopping: threading.Event) -> int:
     while not stopping.is_set() and node.failure is None:
         # The timers wake the wait 20 times a second; Python's signal handlers run in between.
         executor.spin_once()
+    failure = node.failure
     finished = node.stop()
-    if node.failure is not None:
-        sys.stderr.write(f'pop node: {node.failure}\n')
-    code = OK if node.failure is None else (
-        BAD_USAGE if isinstance(node.failure, PopError) else FAILED)
+    if failure is not None:
+        sys.stderr.write(f'pop node: {failure}\n')
+    code = OK if failure is None else BAD_USAGE if isinstance(failure, PopError) else FAILED
     if not finished:
         # Tearing down the interpreter under a thread that still computes would crash it.
         sys.stdout.flush()

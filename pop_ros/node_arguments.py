@@ -6,8 +6,13 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pop_ros.camera_presets import CAMERA_PRESETS, camera_preset
+from pop_ros.sources import make_detector
+
+if TYPE_CHECKING:
+    from pop_core.keypoints.detection import KeypointDetector
 
 EPILOG = (
     'Topics are remapped and parameters set as for every node: '
@@ -28,6 +33,14 @@ class SourceArguments:
     keypoints: str = 'depth'
     keypoints_dir: Path | None = None
     decoder: str | None = None
+
+    def detector(self) -> KeypointDetector:
+        """Return the keypoint source that is named.
+
+        Raises:
+            PopError: If there is none, or it lacks what it needs.
+        """
+        return make_detector(self.keypoints, self.keypoints_dir, self.decoder)
 
     def as_flags(self) -> list[str]:
         """Return the flags that give these arguments."""

@@ -61,6 +61,32 @@ class TfConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class SnapshotConfig:
+    """What ~/snapshot does."""
+
+    folder: str = setting(
+        'snapshots', about='Folder that ~/snapshot writes into, from where the node was started.')
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosticsConfig:
+    """Beyond which values /diagnostics warns; 0 switches a warning off."""
+
+    max_age_s: float = setting(
+        1.0, unit='s', minimum=0.0, maximum=3600.0,
+        about='Warn when the images are older than this when their people are published.')
+    min_rate_hz: float = setting(
+        0.0, unit='Hz', minimum=0.0, maximum=1000.0,
+        about='Warn when fewer frames per second are fitted while somebody listens.')
+    max_skew_s: float = setting(
+        0.02, unit='s', minimum=0.0, maximum=10.0,
+        about='Warn when stamps of colour and depth usually differ by more.')
+    max_drops: float = setting(
+        0.5, minimum=0.0, maximum=1.0,
+        about='Warn when a larger share of the pairs is dropped for a fault of theirs.')
+
+
+@dataclass(frozen=True, slots=True)
 class NodeConfig:
     """Settings of the node around the pipeline."""
 
@@ -69,6 +95,10 @@ class NodeConfig:
     depth: DepthConfig = field(default_factory=DepthConfig)
     mesh: MeshConfig = field(default_factory=MeshConfig)
     tf: TfConfig = field(default_factory=TfConfig)
+    snapshot: SnapshotConfig = field(default_factory=SnapshotConfig)
+    diagnostics: DiagnosticsConfig = field(default_factory=DiagnosticsConfig)
+    autostart: bool = setting(
+        True, about='Whether the node configures and activates itself; else its manager does.')
     lazy: bool = setting(
         True, about='Work only while somebody subscribes to an output.')
     enabled: bool = setting(True, about='Whether frames are processed.')

@@ -76,13 +76,14 @@ def status_sentence(result: FrameResult) -> str:
     return '; '.join([fitted, *(f'{count} not fitted: {why}' for why, count in dropped.items())])
 
 
-def write_png(path: Path, rgb: np.ndarray) -> None:
-    """Write an RGB picture.
+def write_png(path: Path, pixels: np.ndarray) -> None:
+    """Write an RGB picture, or an image of one channel of 8 or 16 bits.
 
     Raises:
         OSError: If the file cannot be written.
     """
-    done, content = cv2.imencode('.png', cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR))
+    image = pixels if pixels.ndim == 2 else cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR)
+    done, content = cv2.imencode('.png', image)
     if not done:
         raise OSError(f'{path}: the picture could not be encoded')
     path.write_bytes(content.tobytes())

@@ -26,22 +26,28 @@ class Snapshot:
     """A consistent copy of the counts.
 
     Args:
+        taken_s: Steady time of the copy [s].
         pairs: Pairs handed to the worker.
         frames: Frames fitted.
         people: People fitted in all frames.
         latest_people: People in the latest frame.
         drops: Pairs that gave no frame, by reason.
+        refused: Pairs dropped because something was wrong with them.
+        faults: Those of them that met a fault of the node itself.
         latest_drop: The latest drop in words.
         latency_ms: Latest times from arrival of a pair to publishing [ms].
         age_ms: Latest ages of the image stamp at publishing [ms].
         step_ms: Latest time of every step of the pipeline [ms].
     """
 
+    taken_s: float
     pairs: int
     frames: int
     people: int
     latest_people: int
     drops: Mapping[str, int]
+    refused: int
+    faults: int
     latest_drop: str
     latency_ms: tuple[float, ...]
     age_ms: tuple[float, ...]
@@ -61,6 +67,8 @@ class NodeStatistics:
     frames: int = 0
     people: int = 0
     latest_people: int = 0
+    refused: int = 0
+    faults: int = 0
     latest_drop: str = ''
     drops: Counter[str] = field(default_factory=Counter)
     _latency_ms: deque[float] = field(default_factory=lambda: deque(maxlen=WINDOW))
@@ -87,12 +95,25 @@ class NodeStatistics:
             for name, value in step_ms.items():
                 self._step_ms.setdefault(name, deque(maxlen=WINDOW)).append(value)
 
-    def add_drop(self, reason: str, text: str) -> bool:
-        """Count a dropped pair; return whether it is time to say so (first, then every 5 s)."""
+    def add_drop(self, reason: str) -> None:
+        """Count a pair that nobody needed any more."""
+        with self._lock:
+            self.drops[reason] += 1
+
+    def add_refusal(self, reason: str, text: str, *, is_fault: bool = False) -> bool:
+        """Count a pair that gave no frame; return whether to say so (first, then every 5 s).
+
+        Args:
+            reason: Kind of the drop in words.
+            text: What was wrong.
+            is_fault: Whether the node is to blame, and not the pair.
+        """
         now = time.monotonic()
         kind = re.sub(r'\d+', '#', text)  # stamps and sizes make no new kind of drop
         with self._lock:
             self.drops[reason] += 1
+            self.refused += 1
+            self.faults += is_fault
             self.latest_drop = text
             due = now - self._said.get(kind, -np.inf) > REMINDER_S
             if due:
@@ -103,6 +124,7 @@ class NodeStatistics:
         """Return a consistent copy."""
         with self._lock:
             return Snapshot(
-                self.pairs, self.frames, self.people, self.latest_people, dict(self.drops),
-                self.latest_drop, tuple(self._latency_ms), tuple(self._age_ms),
+                time.monotonic(), self.pairs, self.frames, self.people, self.latest_people,
+                dict(self.drops), self.refused, self.faults, self.latest_drop,
+                tuple(self._latency_ms), tuple(self._age_ms),
                 {name: tuple(values) for name, values in self._step_ms.items()})

@@ -1,17 +1,12 @@
 """Explanations name the cause, the numbers and what to do."""
 
-from pop_core.errors import PopError
-from pop_ros.diagnostics import diagnostic_array, percentiles, read_values
 from pop_ros.explanation import (
     TopicReport,
     explain_missing_pairs,
     explain_refused_pairs,
     round_up,
 )
-from pop_ros.from_messages import BadMessageError
 from pop_ros.pairing import FramePairer
-from pop_ros.statistics import NodeStatistics, drop_reason
-from pop_ros.to_messages import make_header
 
 MS = 1_000_000
 
@@ -61,67 +56,3 @@ def test_missing_slow_and_far_depth_are_told_apart() -> None:
 def test_suggested_slops_are_round_and_large_enough() -> None:
     for seconds in (0.003, 0.031, 0.0999, 0.113, 0.2, 0.336, 1.04):
         assert seconds < round_up(seconds) <= seconds + 0.1 + 1e-9
-
-
-def test_reasons_are_words() -> None:
-    assert drop_reason(BadMessageError('x')) == 'bad message'
-    assert drop_reason(PopError('x')) == 'pop'
-    assert drop_reason(ZeroDivisionError('x')) == 'zero division'
-
-
-def test_the_same_drop_is_said_once_and_another_kind_at_once() -> None:
-    statistics = NodeStatistics()
-    assert statistics.add_drop('no keypoints', 'no file 123.json')
-    assert not statistics.add_drop('no keypoints', 'no file 456.json')
-    assert statistics.add_drop('no keypoints', 'folder vanished')
-    assert statistics.snapshot().drops == {'no keypoints': 3}
-
-
-def test_pending_is_what_was_neither_fitted_nor_dropped() -> None:
-    statistics = NodeStatistics()
-    for _ in range(5):
-        statistics.add_pair()
-    statistics.add_drop('bad message', 'x')
-    statistics.add_frame(2, 100.0, 120.0, {'fit': 90.0})
-    snapshot = statistics.snapshot()
-    assert snapshot.pending == 3
-    assert snapshot.people == 2
-
-
-def test_diagnostics_warn_when_most_pairs_are_dropped_and_carry_all_counts() -> None:
-    statistics = NodeStatistics()
-    pairer: FramePairer[int] = FramePairer(0)
-
-    def status(trouble: str = '') -> tuple[bytes, str, dict[str, str]]:
-        message = diagnostic_array(
-            make_header(0, ''), '/pop', statistics.snapshot(), previous=None, pairer=pairer,
-            reports=[report('color/image')], trouble=trouble)
-        values = read_values(message, '/pop')
-        assert values is not None
-        return message.status[0].level, message.status[0].message, values
-
-    statistics.add_pair()
-    statistics.add_frame(1, 100.0, 120.0, {'fit': 90.0})
-    level, text, values = status()
-    assert (level, text) == (b'\0', '1 people in the latest frame')
-    assert values['frames'] == '1'
-    assert values['step fit'] == 'p50 90.0 ms, p95 90.0 ms'
-    assert values['received color/image'] == '9'
-    for _ in range(3):
-        statistics.add_drop('bad message', 'expected 3 rows')
-    level, text, values = status()
-    assert level == b'\1'
-    assert 'expected 3 rows' in text
-    assert values['dropped: bad message'] == '3'
-    assert status('no camera\n  more')[:2] == (b'\1', 'no camera')
-
-
-def test_values_of_another_status_are_not_ours() -> None:
-    message = diagnostic_array(
-        make_header(0, ''), '/other', NodeStatistics().snapshot(), previous=None,
-        pairer=FramePairer[int](0), reports=[], trouble='')
-    assert read_values(message, '/pop') is None
-
-
-def test_percentiles_of_nothing_are_a_dash() -> None:
-    assert percentiles([]) == '-'

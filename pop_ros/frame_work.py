@@ -1,0 +1,169 @@
+"""What the worker thread does: prepare once, then fit the newest pair and publish."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.task import Future
+
+from pop_core.config import PipelineConfig
+from pop_core.errors import PopError
+from pop_core.keypoints.detection import KeypointDetector
+from pop_ros.frame_fitter import FittedFrame, FrameFitter
+from pop_ros.from_messages import stamp_ns
+from pop_ros.inputs import RgbdMessages
+from pop_ros.node_config import NodeConfig
+from pop_ros.node_outputs import NodeOutputs
+from pop_ros.parameters import ConfigParameters
+from pop_ros.snapshot import save_snapshot
+from pop_ros.static_frames import StaticFrames
+from pop_ros.statistics import NodeStatistics, drop_reason
+from pop_ros.worker import Worker
+
+Settings = ConfigParameters[NodeConfig, PipelineConfig]
+PROGRESS_STEP = 0.1
+REPLACED, STOPPED = 'replaced by a newer pair', 'stopped before it was fitted'
+NO_FRAME = 'no frame has been fitted yet: somebody must subscribe an output, and images arrive'
+
+
+class FrameWork:
+    """A worker, and what only its thread touches.
+
+    Attributes:
+        failure: What ended the preparation, or None.
+        doing: What the preparation does, in words; '' when it is over.
+    """
+
+    def __init__(
+        self, node: Node, settings: Settings, detector: KeypointDetector, frames: StaticFrames,
+        outputs: NodeOutputs, statistics: NodeStatistics,
+    ) -> None:
+        """Start to prepare: load the library and compile kernels, in the worker's thread."""
+        self.failure: Exception | None = None
+        self.doing = 'loading'
+        self._settings, self._outputs, self._statistics = settings, outputs, statistics
+        self._log, self._clock = node.get_logger(), node.get_clock()  # type: ignore[no-untyped-call]
+        self._running = threading.Event()
+        self._fitter: FrameFitter | None = None
+        self._latest: FittedFrame | None = None
+        self._said_share = 0.0
+        self._worker: Worker[RgbdMessages] = Worker(
+            self._fit, self._on_error, lambda: self._prepare(detector, frames))
+        self._worker.start()
+
+    # Executor thread
+
+    @property
+    def is_ready(self) -> bool:
+        """Return whether frames can be fitted."""
+        return self._fitter is not None
+
+    def put(self, messages: RgbdMessages) -> None:
+        """Have a pair fitted unless a newer one comes first."""
+        self._statistics.add_pair()
+        if self._worker.mailbox.put(messages):
+            self._statistics.add_drop(REPLACED)
+
+    def run(self, running: bool) -> None:
+        """Fit what comes, or stop and remove the people that are shown."""
+        if running == self._running.is_set():
+            return
+        if running:
+            self._running.set()
+        else:
+            self._running.clear()
+            self._worker.call(self._clear)
+
+    def configure(self) -> None:
+        """Take over changed settings before the next frame."""
+        self._worker.call(self._configure)
+
+    def reset(self) -> None:
+        """Start the ids of people anew with the next frame."""
+        self._worker.call(self._reset)
+
+    def snapshot(self, folder: Path) -> Any:
+        """Write the latest frame below `folder`; await success, and where it is or why not."""
+        answer: Any = Future()  # type: ignore[no-untyped-call]
+        if self._latest is None:
+            answer.set_result((False, NO_FRAME))
+        else:
+            self._worker.call(lambda: answer.set_result(self._snapshot(folder)))
+        return answer
+
+    def stop(self, timeout_s: float) -> bool:
+        """End the thread; return whether the frame in work was finished in time."""
+        self.run(False)
+        return self._worker.stop(timeout_s)
+
+    # Worker thread
+
+    def _prepare(self, detector: KeypointDetector, frames: StaticFrames) -> None:
+        started_s = time.monotonic()
+        self._log.info(
+            'preparing; the first start generates the pose library and compiles kernels, later '
+            'ones read them from the cache')
+        fitter = FrameFitter(
+            detector, self._settings.pipeline_config, self._settings.node_config,
+            self._say_progress, frames)
+        self._outputs.publish_model(fitter.model)
+        self._fitter = fitter
+        self.doing = ''
+        self._log.info(f'ready after {time.monotonic() - started_s:.1f} s')
+
+    def _say_progress(self, share: float, sentence: str) -> None:
+        self.doing = f'{share:.0%} {sentence}'
+        if share >= self._said_share + PROGRESS_STEP:
+            self._said_share = share
+            self._log.info(self.doing)
+
+    def _fit(self, messages: RgbdMessages) -> None:
+        if self._fitter is None or not self._running.is_set():
+            self._statistics.add_drop(STOPPED)
+            return
+        self._latest = fitted = self._fitter.fit(
+            messages.color, messages.depth, messages.info, messages.depth_info,
+            wanted=self._outputs.wanted(self._settings.node_config))
+        self._outputs.publish(fitted.outputs)
+        latency_ms = (time.monotonic() - messages.arrival_s) * 1e3
+        age_ms = (self._clock.now().nanoseconds - stamp_ns(messages.color.header)) / 1e6
+        result = fitted.result
+        self._statistics.add_frame(len(result.bodies), latency_ms, age_ms, result.times_ms)
+
+    def _clear(self) -> None:
+        if self._fitter is not None:
+            wanted = self._outputs.wanted(self._settings.node_config)
+            self._outputs.publish(self._fitter.clear(wanted))
+
+    def _configure(self) -> None:
+        if self._fitter is not None:
+            self._fitter.configure(self._settings.pipeline_config, self._settings.node_config)
+
+    def _reset(self) -> None:
+        if self._fitter is not None:
+            self._fitter.reset()
+
+    def _snapshot(self, folder: Path) -> tuple[bool, str]:
+        if self._fitter is None or self._latest is None:
+            return False, NO_FRAME
+        frame, result = self._latest.frame, self._latest.result
+        try:
+            written = save_snapshot(
+                folder, frame, self._fitter.detect(frame), result, self._fitter.model)
+        except (OSError, PopError) as error:
+            return False, str(error)
+        return True, str(written)
+
+    def _on_error(self, error: Exception) -> None:
+        if self._fitter is None:
+            self.failure = error
+            return
+        reason = drop_reason(error)
+        is_fault = not isinstance(error, PopError)
+        if self._statistics.add_refusal(reason, str(error), is_fault=is_fault):
+            say = self._log.error if is_fault else self._log.warning
+            say(f'frame dropped ({reason}): {error}')

@@ -1,0 +1,147 @@
+"""The node's life cycle and services, over DDS, in the order in which a manager uses them."""
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseArray
+from lifecycle_msgs.srv import ChangeState, GetState
+from std_srvs.srv import SetBool, Trigger
+from support.node import ROOT, RunningNode
+from support.player import Player
+from support.recording import Recording, record
+from visualization_msgs.msg import Marker
+
+from pop_ros.frame_folder import load_frame
+
+
+@pytest.fixture(scope='module')
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    return record(tmp_path_factory.mktemp('keypoints'), n_frames=1, rate_hz=1.0)
+
+
+def flags(recording: Recording) -> list[str]:
+    return ['--keypoints', 'json', '--keypoints-dir', str(recording.keypoints)]
+
+
+def state(player: Player) -> str:
+    return str(player.call(GetState, 'get_state', GetState.Request()).current_state.label)
+
+
+def change(player: Player, transition: str) -> bool:
+    request = ChangeState.Request()
+    request.transition.label = transition
+    return bool(player.call(ChangeState, 'change_state', request).success)
+
+
+def fit_one(player: Player, recording: Recording) -> None:
+    """Play the frame until its person comes back."""
+    assert player.spin_until(player.is_heard)
+    player.received['joints'].clear()
+    player.play(recording.scenes[0].frame)
+    assert player.spin_until(lambda: player.received['joints'])
+
+
+def test_a_manager_takes_the_node_through_its_life(recording: Recording) -> None:
+    running = RunningNode(*flags(recording), '--ros-args', '-p', 'autostart:=false')
+    with Player(joints=PoseArray, mesh=Marker) as player:
+        assert state(player) == 'unconfigured'
+        assert not change(player, 'activate')
+        assert 'preparing' not in running.output
+        assert change(player, 'configure')
+        running.wait_for('ready after')
+        assert state(player) == 'inactive'
+        # Inactive, it does not touch the camera although somebody listens.
+        assert not player.spin_until(player.is_heard, 1.0)
+        assert change(player, 'activate')
+        fit_one(player, recording)
+        poses = player.received['joints'][0].poses
+        assert len(poses) == 24
+        # Who is shown is removed, since nobody will follow them any more.
+        assert change(player, 'deactivate')
+        assert player.spin_until(lambda: not player.is_heard())
+        assert player.spin_until(lambda: player.received['mesh'][-1].action == Marker.DELETE)
+        assert player.spin_until(lambda: not player.received['joints'][-1].poses)
+        assert change(player, 'cleanup')
+        assert state(player) == 'unconfigured'
+        # A second life is like the first.
+        assert change(player, 'configure')
+        assert change(player, 'activate')
+        fit_one(player, recording)
+        assert change(player, 'shutdown')
+        assert state(player) == 'finalized'
+        assert player.spin_until(lambda: not player.is_heard())
+    assert running.end(signal.SIGTERM) == 0, running.output
+    assert 'Traceback' not in running.output
+
+
+def test_configuring_without_keypoints_fails_with_a_sentence_and_the_node_stays() -> None:
+    running = RunningNode('--keypoints', 'json', '--keypoints-dir', '/nowhere',
+                          '--ros-args', '-p', 'autostart:=false')
+    with Player() as player:
+        assert not change(player, 'configure')
+        assert state(player) == 'unconfigured'
+        running.wait_for('not configured: keypoints: expected a folder')
+    assert running.end() == 0
+
+
+def test_services_act_on_what_is_shown_and_seen(recording: Recording, tmp_path: Path) -> None:
+    shots = tmp_path / 'shots'
+    running = RunningNode(
+        *flags(recording), '--ros-args', '-p', f'snapshot.folder:={shots}')
+    with Player(joints=PoseArray, mesh=Marker) as player:
+        early = player.call(Trigger, 'snapshot', Trigger.Request())
+        assert not early.success
+        assert 'no frame has been fitted yet' in early.message
+        fit_one(player, recording)
+        first_id = player.received['mesh'][-1].id
+        check_snapshot(player, shots, recording)
+        # Disabled, the node unsubscribes and removes who is shown.
+        assert player.call(SetBool, 'enable', SetBool.Request(data=False)).success
+        assert player.spin_until(lambda: not player.is_heard())
+        assert player.spin_until(lambda: player.received['mesh'][-1].action == Marker.DELETE)
+        assert player.received['mesh'][-1].id == first_id
+        assert player.call(SetBool, 'enable', SetBool.Request(data=True)).success
+        assert player.call(Trigger, 'reset', Trigger.Request()).success
+        fit_one(player, recording)
+    assert running.end() == 0, running.output
+
+
+def check_snapshot(player: Player, shots: Path, recording: Recording) -> None:
+    """Check that `pop fit` repeats at a desk what the node found."""
+    answer = player.call(Trigger, 'snapshot', Trigger.Request())
+    assert answer.success, answer.message
+    folder = Path(answer.message)
+    assert folder.parent == shots
+    frame = load_frame(folder)
+    np.testing.assert_array_equal(frame.rgb, recording.scenes[0].frame.rgb)
+    found = np.load(folder / 'result' / 'person_0.npz')
+    again = shots / 'again'
+    command = [sys.executable, '-m', 'pop_ros.cli', 'fit', str(folder), '--out', str(again)]
+    subprocess.run(command, check=True, cwd=ROOT, capture_output=True)
+    repeated = np.load(again / folder.name / 'person_0.npz')
+    # Keypoints and depth are rounded on their way through files.
+    np.testing.assert_allclose(repeated['joints'], found['joints'], atol=0.02)
+
+
+@pytest.mark.parametrize('delay_s', [0.15, 0.4, 0.8])
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_modules_are_imported_ends_the_node_cleanly(
+    recording: Recording, number: signal.Signals, delay_s: float
+) -> None:
+    # Python itself must have started: before that no program can catch anything.
+    code = f'import sys; sys.path.insert(0, {str(ROOT)!r}); import pop_ros.node as n; print("up", '
+    code += f'flush=True); sys.exit(n.main({flags(recording)!r}))'
+    process = subprocess.Popen(
+        [sys.executable, '-c', code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    assert process.stdout.readline() == 'up\n'
+    time.sleep(delay_s)
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=30)
+    assert process.returncode == 0, errors
+    assert 'Traceback' not in errors
