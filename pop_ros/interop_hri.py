@@ -58,7 +58,7 @@ def region_message(person: Person, header: Header, hri_msgs: Any) -> Any:
 def cropped_message(person: Person, frame: RgbdFrame, header: Header) -> Image:
     """Return the colour image's part around the mesh; empty outside the image."""
     if person.box_px is None:
-        return color_message(np.zeros((0, 0, 3), np.uint8), header)
+        return Image(header=header, encoding='rgb8')
     left, top = np.floor(person.box_px[:2]).astype(int)
     right, bottom = np.ceil(person.box_px[2:]).astype(int) + 1
     return color_message(frame.rgb[top:bottom, left:right], header)

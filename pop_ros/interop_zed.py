@@ -34,7 +34,7 @@ TRACKING = {TrackState.NEW: OK, TrackState.TRACKED: OK, TrackState.PREDICTED: SE
             TrackState.LOST: SEARCHING}
 NO_PIXEL = -1.0  # of a point outside the image
 LABELS = 2**15  # label_id is an int16
-HEAD_RADIUS_M = 0.12
+HEAD_RADIUS_M = 0.14
 UPPER_TRIANGLE = np.triu_indices(3)
 # Corners of a box in ZED's order: around the top, then around the bottom. Up is -y.
 AROUND = ((0, 0), (0, 1), (1, 1), (1, 0))  # (right, far)

@@ -66,7 +66,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(found: argparse.Namespace) -> None:
     model = default_body() if found.model is None else load_body_model(found.model)
-    node = ViewerNode(model, found.node, MeshConfig(found.detail, found.lifetime_s))
+    config = MeshConfig(detail=found.detail, lifetime_s=found.lifetime_s)
+    node = ViewerNode(model, found.node, config)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     with suppress(KeyboardInterrupt, ExternalShutdownException):
