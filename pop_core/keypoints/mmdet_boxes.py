@@ -24,7 +24,7 @@ from pop_core.keypoints.network_input import (
     planes,
     takes_planes,
 )
-from pop_core.keypoints.one_stage import best_rows
+from pop_core.keypoints.one_stage import person_boxes
 
 GREY = 114
 SIDE, MULTIPLE = 640, 32
@@ -59,9 +59,7 @@ class RtmDetDecoder:
         count = min(len(dets), len(labels))
         boxes = dets[:count, :4]
         scores = np.where(labels[:count] == PERSON, dets[:count, 4], 0.0)
-        return [
-            PersonBox(placed.to_image(boxes[i].reshape(2, 2)).ravel(), float(scores[i]))
-            for i in best_rows(boxes, scores)]
+        return person_boxes(boxes, scores, placed)
 
 
 class YoloxSuppressedDecoder(RtmDetDecoder):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pop_core.keypoints.boxes import suppressed
+from pop_core.keypoints.boxes import PersonBox, suppressed
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.keypoint_sets import COCO_17, shared_joints
 from pop_core.keypoints.letterbox import Letterbox
@@ -46,6 +46,15 @@ def people_of(rows: PeopleRows, placed: Letterbox) -> list[Detection]:
     return detections
 
 
+def person_boxes(
+    boxes_px: Float[np.ndarray, 'n 4'], scores: Float[np.ndarray, 'n'], placed: Letterbox
+) -> list[PersonBox]:
+    """Return the boxes of people, best first, each once, in pixels of the image."""
+    return [
+        PersonBox(placed.to_image(boxes_px[i].reshape(2, 2)).ravel(), min(1.0, float(scores[i])))
+        for i in best_rows(boxes_px, scores)]
+
+
 def best_rows(
     boxes_px: Float[np.ndarray, 'n 4'], scores: Float[np.ndarray, 'n']
 ) -> list[int]:
@@ -60,4 +69,5 @@ def best_rows(
 def corners_of(centred: Float[np.ndarray, 'n 4']) -> Float[np.ndarray, 'n 4']:
     """Return left, top, right, bottom of boxes given as centre, width and height."""
     half = 0.5 * centred[:, 2:]
-    return np.concatenate([centred[:, :2] - half, centred[:, :2] + half], axis=1)
+    with np.errstate(invalid='ignore'):
+        return np.concatenate([centred[:, :2] - half, centred[:, :2] + half], axis=1)

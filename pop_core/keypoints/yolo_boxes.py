@@ -17,7 +17,7 @@ from pop_core.keypoints.boxes import PersonBox
 from pop_core.keypoints.letterbox import letterbox
 from pop_core.keypoints.network import NetworkSpec, Run
 from pop_core.keypoints.network_input import UNIT_RGB, input_size, planes, takes_planes
-from pop_core.keypoints.one_stage import best_rows, corners_of
+from pop_core.keypoints.one_stage import corners_of, person_boxes
 
 GREY = 114
 SIDE, MULTIPLE = 640, 32
@@ -54,6 +54,4 @@ class YoloBoxDecoder:
             boxes, scores = corners_of(output[:4].T), output[4 + PERSON]
         else:
             boxes, scores = output[:, :4], np.where(output[:, 5] == PERSON, output[:, 4], 0.0)
-        return [
-            PersonBox(placed.to_image(boxes[i].reshape(2, 2) - 0.5).ravel(), float(scores[i]))
-            for i in best_rows(boxes, scores)]
+        return person_boxes(boxes - 0.5, scores, placed)

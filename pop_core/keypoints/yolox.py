@@ -16,7 +16,7 @@ from pop_core.keypoints.boxes import PersonBox
 from pop_core.keypoints.letterbox import letterbox
 from pop_core.keypoints.network import NetworkSpec, Run
 from pop_core.keypoints.network_input import BYTES_BGR, planes, takes_planes
-from pop_core.keypoints.one_stage import best_rows, corners_of
+from pop_core.keypoints.one_stage import corners_of, person_boxes
 
 GREY = 114
 STRIDES = (8, 16, 32)
@@ -57,9 +57,7 @@ class YoloxDecoder:
             size = np.exp(np.minimum(output[:, 2:4], LARGEST_LOG)) * stride[:, None]
             scores = output[:, 4] * output[:, 5]
         boxes = corners_of(np.concatenate([centre, size], axis=1)) - 0.5
-        return [
-            PersonBox(placed.to_image(boxes[i].reshape(2, 2)).ravel(), float(scores[i]))
-            for i in best_rows(boxes, scores)]
+        return person_boxes(boxes, scores, placed)
 
 
 def _grid(
