@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -65,7 +66,9 @@ class PopNode(LifecycleNode):
         self._health = NodeHealth(self, self._inputs, self._statistics)
         self.create_service(SetBool, '~/enable', self._on_enable)
         self.create_service(Trigger, '~/reset', self._on_reset)
-        self.create_service(Trigger, '~/snapshot', self._on_snapshot)
+        # In a group of its own: while it waits for the worker, timers and inputs go on.
+        self.create_service(
+            Trigger, '~/snapshot', self._on_snapshot, callback_group=ReentrantCallbackGroup())
         # Steady timers: a simulated clock that stands still must not silence the node.
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(POLL_S, self._inputs.poll, clock=steady)
