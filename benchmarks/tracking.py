@@ -37,7 +37,7 @@ from pop_core.retrieval.default_library import default_library
 from pop_core.settings import apply_settings
 from pop_core.synthesis.sensor_noise import SENSORS
 from pop_core.synthesis.sequence import SequenceConfig, film_sequence
-from pop_core.synthesis.sequence_kinds import SEQUENCE_KINDS
+from pop_core.synthesis.sequence_names import SequenceKind
 from pop_core.tracking.tracking_config import TrackingConfig
 
 FIRST_SEED = 20_000  # far from the seeds of tests, training and single scenes
@@ -73,11 +73,12 @@ def parse(argv: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog='python -m benchmarks tracking', description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter)
+    kinds = [kind.value for kind in SequenceKind]
     parser.add_argument('--frames', type=int, default=120, help='frames of each sequence')
     parser.add_argument('--rate', type=float, default=30.0, help='frames per second')
     parser.add_argument(
-        '--kinds', nargs='+', choices=SEQUENCE_KINDS, default=list(SEQUENCE_KINDS),
-        metavar='KIND', help=f'of {", ".join(SEQUENCE_KINDS)}')
+        '--kinds', nargs='+', choices=kinds, default=kinds, metavar='KIND',
+        help=f'of {", ".join(kinds)}')
     parser.add_argument('--seeds', type=int, default=1, help='sequences of each kind')
     parser.add_argument('--seed', type=int, default=FIRST_SEED, help='seed of the first')
     parser.add_argument(
@@ -119,7 +120,7 @@ def measure(options: argparse.Namespace, console: Console) -> list[FollowedSeque
             path = folder / f'{kind}-{seed}.npz'
             if not path.is_file():
                 film = SequenceConfig(
-                    kind, options.frames, options.rate, options.sensor, colour=False)
+                    SequenceKind(kind), options.frames, options.rate, options.sensor, colour=False)
                 methods = make_methods(options.methods, pipeline, tracking)
                 truth, tracks = follow(
                     film_sequence(model, seed, film), options.rate, methods, detector,

@@ -1,54 +1,86 @@
-"""`pop synth`: synthetic scenes with truth, as folders that `pop fit` reads."""
+"""`pop synth`: synthetic scenes with truth, as folders that `pop fit` reads, or as recordings."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from pop_core.synthesis.scenes import SyntheticScene
+from pop_core.synthesis.sequence_names import ABOUT, SequenceKind
 
 SHEET_SCENES = 24
+KINDS = '; '.join(f'{kind.value}: {about}' for kind, about in ABOUT.items())
+
+
+class Sensor(str, Enum):
+    """Whose depth noise."""
+
+    STRUCTURED_LIGHT = 'structured_light'
+    STEREO = 'stereo'
+    TIME_OF_FLIGHT = 'time_of_flight'
+    PERFECT = 'perfect'
 
 
 def synth(
-    out: Annotated[Path, typer.Option('--out', help='Folder to write the scenes into.')],
-    count: Annotated[int, typer.Option('--count', min=1, help='Number of scenes.')] = 12,
+    out: Annotated[Path, typer.Option('--out', help='Folder to write into.')],
+    count: Annotated[int | None, typer.Option(
+        '--count', min=1, help='Number of scenes (12), or of frames of a recording (90).')] = None,
     seed: Annotated[int, typer.Option('--seed', min=0, help='First seed.')] = 0,
-    sequence: Annotated[
-        bool, typer.Option('--sequence', help='One person walking, instead of single scenes.'),
-    ] = False,
+    sequence: Annotated[SequenceKind | None, typer.Option(
+        '--sequence', metavar='KIND',
+        help=f'Write a recording of people who move. {KINDS}.'),
+    ] = None,
+    rate: Annotated[float, typer.Option(
+        '--rate', min=0.1, max=1000.0, help='Frames per second of a recording.')] = 30.0,
+    sensor: Annotated[Sensor, typer.Option(
+        '--sensor', help='Depth noise of a recording; scenes draw one each.',
+    )] = Sensor.STRUCTURED_LIGHT,
 ) -> None:
-    """Write synthetic RGB-D scenes of occluded people, their truth and a contact sheet."""
+    """Write synthetic RGB-D frames of occluded people with their truth, and pictures of them.
+
+    Single scenes: one folder each, as pop fit reads it.
+
+      pop synth --count 4 --out frames
+
+      pop fit frames --out results
+
+    A recording: OUT/recording is a rosbag2 as a camera driver writes it,
+    the camera's pose on /tf; OUT/keypoints is what a detector would say;
+    OUT/truth.npz and OUT/masks are the truth; OUT/film.mp4 shows it all.
+
+      pop synth --sequence crossing --count 150 --out walk
+
+      pop replay walk/recording --keypoints json
+      --keypoints-dir walk/keypoints --every-frame --out bodies
+    """
+    if sequence is None:
+        _write_scenes(out, 12 if count is None else count, seed)
+    else:
+        from pop_ros.synth_sequence_command import write_sequence
+
+        depth_noise = '' if sensor is Sensor.PERFECT else sensor.value
+        write_sequence(out, sequence, 90 if count is None else count, seed, rate, depth_noise)
+
+
+def _write_scenes(out: Path, count: int, seed: int) -> None:
     import cv2
     from rich.progress import track
 
+    from pop_core.body.default_body import default_body
     from pop_core.synthesis.contact_sheet import contact_sheet
     from pop_core.synthesis.scene_files import save_scene
+    from pop_core.synthesis.scenes import synthesise_scene
 
     out.mkdir(parents=True, exist_ok=True)
     kept = []
     step = max(1, count // SHEET_SCENES)
-    for k, scene in enumerate(track(_scenes(count, seed, sequence), 'Scenes', total=count)):
-        name = f'frame_{k:04d}' if sequence else f'scene_{scene.seed:06d}'
-        save_scene(scene, out / name)
+    for k in track(range(count), 'Scenes'):
+        scene = synthesise_scene(default_body(), seed + k)
+        save_scene(scene, out / f'scene_{scene.seed:06d}')
         if k % step == 0:
             kept.append(scene)
     sheet = out / 'contact_sheet.png'
     cv2.imwrite(str(sheet), contact_sheet(kept)[..., ::-1])
     typer.echo(f'{count} scenes in {out}, overview in {sheet}')
-
-
-def _scenes(count: int, seed: int, sequence: bool) -> Iterable[SyntheticScene]:
-    """Return scenes one by one: a sequence at once, since its frames belong together."""
-    from pop_core.body.default_body import default_body
-    from pop_core.synthesis.scenes import synthesise_scene
-    from pop_core.synthesis.sequence import synthesise_sequence
-
-    model = default_body()
-    if sequence:
-        return synthesise_sequence(model, seed, count)
-    return (synthesise_scene(model, seed + k) for k in range(count))

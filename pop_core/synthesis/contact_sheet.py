@@ -21,7 +21,7 @@ STATE_COLOURS = {
 
 def contact_sheet(scenes: Sequence[SyntheticScene]) -> UInt8[np.ndarray, 'h w 3']:
     """Return colour with the shared points (green seen, red hidden) beside depth, RGB."""
-    tiles = [_tile(scene) for scene in scenes]
+    tiles = [scene_tile(scene) for scene in scenes]
     height = max(tile.shape[0] for tile in tiles)
     rows = -(-len(tiles) // COLUMNS)
     sheet = np.zeros((rows * height, COLUMNS * 2 * TILE_PX, 3), dtype=np.uint8)
@@ -43,7 +43,8 @@ def colour_depth(depth_m: Float32[np.ndarray, 'h w']) -> UInt8[np.ndarray, 'h w 
     return np.where(known[..., None], coloured, 0).astype(np.uint8)
 
 
-def _tile(scene: SyntheticScene) -> UInt8[np.ndarray, 'h w 3']:
+def scene_tile(scene: SyntheticScene) -> UInt8[np.ndarray, 'h w 3']:
+    """Return colour with the shared points beside depth."""
     image = scene.frame.rgb.copy()
     for person in scene.people:
         pixels = scene.frame.camera.project(person.shared_points)

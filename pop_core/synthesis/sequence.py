@@ -13,6 +13,7 @@ from pop_core.synthesis.keypoints import KeypointNoise
 from pop_core.synthesis.scenes import SyntheticScene, photograph
 from pop_core.synthesis.sequence_keypoints import KeypointStream
 from pop_core.synthesis.sequence_kinds import draw_script
+from pop_core.synthesis.sequence_names import SequenceKind
 from pop_core.synthesis.truth import Background, background_of, render_truth
 
 FIRST_STAMP_NS = 1_700_000_000_000_000_000
@@ -38,7 +39,7 @@ class SequenceConfig:
     """How a sequence is recorded.
 
     Args:
-        kind: One of SEQUENCE_KINDS.
+        kind: What happens.
         n_frames: Number of frames.
         rate_hz: Frames per second.
         sensor: Preset of depth noise, '' for none.
@@ -47,7 +48,7 @@ class SequenceConfig:
         start_ns: Stamp of the first frame [ns].
     """
 
-    kind: str = 'table'
+    kind: SequenceKind = SequenceKind.TABLE
     n_frames: int = 90
     rate_hz: float = 30.0
     sensor: str = 'structured_light'
@@ -63,9 +64,6 @@ def film_sequence(
 
     Person, clothes and room stay, noise is new in every frame, and keypoint errors last for some
     frames, as those of real detectors do.
-
-    Raises:
-        SequenceKindError: If there is no such kind.
     """
     rng = np.random.default_rng([seed, 3])
     script = draw_script(model, config.kind, rng, (config.n_frames - 1) / 2 / config.rate_hz)
@@ -97,7 +95,7 @@ def synthesise_sequence(
         progress: Called with the number of finished frames.
     """
     scenes = []
-    config = SequenceConfig('table', n_frames, rate_hz)
+    config = SequenceConfig(SequenceKind.TABLE, n_frames, rate_hz)
     for number, frame in enumerate(film_sequence(model, seed, config), start=1):
         scenes.append(frame.scene)
         if progress is not None:

@@ -10,7 +10,6 @@ from jaxtyping import Float
 
 from pop_core.body.model import BodyModel
 from pop_core.body.skinning import vertices
-from pop_core.errors import PopError
 from pop_core.geometry.transform import invert_transform
 from pop_core.synthesis.blocks import Block, box, moved, yaw_matrix
 from pop_core.synthesis.cameras import CameraRange, draw_camera, look_at
@@ -19,6 +18,7 @@ from pop_core.synthesis.occluders import bare_table, chair_for
 from pop_core.synthesis.people import seat_fit
 from pop_core.synthesis.poses import ScenePose, draw_pose
 from pop_core.synthesis.rooms import draw_clutter, draw_room, varied
+from pop_core.synthesis.sequence_names import SequenceKind
 from pop_core.synthesis.sequence_people import Motion, Performer, draw_look
 from pop_core.synthesis.sequence_poses import PoseToPose, Tempo, draw_arm_poses
 from pop_core.synthesis.sequence_routes import WALKING_M_S, Loop, Place, Route, TurnAround
@@ -29,10 +29,6 @@ AIM = np.array([0.0, 0.95, 0.0])
 ON_SPOT = np.array([0.0, 0.0, 0.1])
 TABLE_M = 0.74  # height
 LEFT_TO_RIGHT = np.pi / 2  # heading along +x, to the right of an image
-
-
-class SequenceKindError(PopError):
-    """A kind of sequence that does not exist."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,22 +58,16 @@ class Script:
 
 
 def draw_script(
-    model: BodyModel, kind: str, rng: np.random.Generator, middle_s: float = 0.0
+    model: BodyModel, kind: SequenceKind, rng: np.random.Generator, middle_s: float = 0.0
 ) -> Script:
     """Return who does what in a sequence of a kind.
 
     Args:
         model: Body model.
-        kind: One of SEQUENCE_KINDS.
+        kind: What happens.
         rng: Randomness.
         middle_s: Middle of a short sequence, when walkers shall be in the middle of the image [s].
-
-    Raises:
-        SequenceKindError: If there is no such kind.
     """
-    if kind not in _SCRIPTS:
-        raise SequenceKindError(
-            f'sequence: expected one of {", ".join(SEQUENCE_KINDS)}, found {kind!r}')
     return _SCRIPTS[kind](model, rng, middle_s)
 
 
@@ -168,13 +158,12 @@ def _still(model: BodyModel, rng: np.random.Generator, _middle_s: float) -> Scri
     return _at_desk(model, [draw_pose(model, 'standing', rng)], Tempo(1.0, 1.0), rng)
 
 
-_SCRIPTS: dict[str, Callable[[BodyModel, np.random.Generator, float], Script]] = {
-    'table': _table, 'crossing': _crossing, 'three': _three, 'wall': _wall, 'leaving': _leaving,
-    'sitting': _sitting, 'turning': _turning, 'arms': _arms, 'camera': _moving_camera,
-    'still': _still,
+_SCRIPTS: dict[SequenceKind, Callable[[BodyModel, np.random.Generator, float], Script]] = {
+    SequenceKind.TABLE: _table, SequenceKind.CROSSING: _crossing, SequenceKind.THREE: _three,
+    SequenceKind.WALL: _wall, SequenceKind.LEAVING: _leaving, SequenceKind.SITTING: _sitting,
+    SequenceKind.TURNING: _turning, SequenceKind.ARMS: _arms,
+    SequenceKind.CAMERA: _moving_camera, SequenceKind.STILL: _still,
 }
-SEQUENCE_KINDS = tuple(_SCRIPTS)
-ABOUT = {kind: (script.__doc__ or '').strip() for kind, script in _SCRIPTS.items()}
 
 
 def _at_desk(
