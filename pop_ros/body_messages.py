@@ -17,7 +17,10 @@ from pop_core.rendering.overlay import draw_people
 from pop_core.rendering.shown_body import shown
 from pop_core.rgbd import RgbdFrame, undistort_frame
 from pop_ros import pop_messages, to_messages
+from pop_ros.humans import HUMANS, HumansFrame
 from pop_ros.image_messages import color_message
+from pop_ros.interop import INTEROP_TYPES, interop_message
+from pop_ros.interop_person import PersonReader
 from pop_ros.node_config import NodeConfig
 from pop_ros.people_markers import PeopleMarkers
 from pop_ros.person_ids import PersonIds
@@ -32,6 +35,7 @@ if pop_messages.pop_msgs is not None:
 OUTPUT_TYPES: dict[str, Any] = {**RECORDED_TYPES, MESH_ARRAY: MarkerArray, OVERLAY: Image}
 if tf2_msgs is not None:
     OUTPUT_TYPES[TF] = tf2_msgs.TFMessage
+OUTPUT_TYPES |= INTEROP_TYPES
 
 # A topic's name without the node's, and a message or its serialised bytes.
 Output = tuple[str, Any]
@@ -47,6 +51,7 @@ class BodyMessages:
         self._present: set[int] = set()
         self._latest: tuple[RgbdFrame, str] | None = None
         self._markers = PeopleMarkers(model, config.mesh)
+        self._reader = PersonReader(model)
 
     def configure(self, config: NodeConfig) -> None:
         """Take over changed settings; ids stay."""
@@ -100,7 +105,24 @@ class BodyMessages:
             makers[TF] = lambda: [
                 transforms_message(bodies, ids, header, self._config.tf.frames)]
         chosen = [(name, make()) for name, make in makers.items() if name in wanted]
-        return [(name, message) for name, made in chosen for message in made]
+        found = [(name, message) for name, made in chosen for message in made]
+        return found + self._for_others(bodies, ids, wanted, changed=changed)
+
+    def _for_others(
+        self, bodies: Sequence[BodyEstimate], ids: Sequence[int], wanted: Collection[str], *,
+        changed: bool,
+    ) -> list[Output]:
+        """Return people in the words of other packages; REP-155 hears of every frame."""
+        names = [name for name in INTEROP_TYPES if name in wanted and changed]
+        if not names and HUMANS not in wanted:
+            return []
+        assert self._latest is not None
+        frame, frame_id = self._latest
+        header = to_messages.make_header(frame.stamp_ns, frame_id)
+        people = [self._reader.read(number, body, frame.camera)
+                  for number, body in zip(ids, bodies, strict=True)]
+        found: list[Output] = [(name, interop_message(name, people, header)) for name in names]
+        return found + [(HUMANS, HumansFrame(people, frame, header))] * (HUMANS in wanted)
 
     def _overlay(self, result: FrameResult, frame: RgbdFrame, header: Header) -> Image:
         # Meshes are drawn as a pinhole sees them.

@@ -26,6 +26,7 @@ from pop_ros.interop_person import Person
 from pop_ros.qos import output_qos
 from pop_ros.tf_messages import tf2_msgs
 
+HUMANS = 'humans'  # the one output that is many topics
 ROOT = '/humans/bodies'
 Place = tuple[Float[np.ndarray, '3'], Float[np.ndarray, '3 3']]
 

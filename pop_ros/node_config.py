@@ -97,6 +97,8 @@ class NodeConfig:
     tf: TfConfig = field(default_factory=TfConfig)
     snapshot: SnapshotConfig = field(default_factory=SnapshotConfig)
     diagnostics: DiagnosticsConfig = field(default_factory=DiagnosticsConfig)
+    rep155: bool = setting(
+        False, about='Publish people below /humans/bodies too (REP-155); needs hri_msgs.')
     autostart: bool = setting(
         True, about='Whether the node configures and activates itself; else its manager does.')
     lazy: bool = setting(
@@ -108,8 +110,19 @@ class NodeConfig:
         _check_choice('mesh.detail', self.mesh.detail, MESH_DETAILS)
         parse_extrinsics(self.depth.extrinsics)
         _check_choice('tf.frames', self.tf.frames, TF_FRAMES)
+        if self.rep155:
+            _check_hri_msgs()
 
 
 def _check_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
     if value not in choices:
         raise SettingError(f'{name}: expected one of {", ".join(choices)}, found {value!r}')
+
+
+def _check_hri_msgs() -> None:
+    from pop_ros.interop import HRI_MISFIT  # settings are read where no ROS is, too
+
+    if HRI_MISFIT:
+        raise SettingError(
+            f'rep155: expected the messages of hri_msgs (ros-jazzy-hri-msgs), found none that '
+            f'fit: {HRI_MISFIT}')

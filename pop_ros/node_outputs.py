@@ -9,6 +9,8 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from pop_core.body.model import BodyModel
 from pop_ros.body_messages import OUTPUT_TYPES, TF, Output
+from pop_ros.humans import HUMANS, HumansTopics
+from pop_ros.interop import MISFITS
 from pop_ros.node_config import NodeConfig
 from pop_ros.pop_messages import model_message, pop_msgs
 from pop_ros.qos import output_qos
@@ -21,6 +23,7 @@ class NodeOutputs:
     def __init__(self, node: Node) -> None:
         """Advertise the topics."""
         self._node = node
+        self._humans = HumansTopics(node)
         self._publishers = {
             name: node.create_publisher(
                 kind, '/tf' if name == TF else f'~/{name}', output_qos(),
@@ -33,14 +36,21 @@ class NodeOutputs:
     def wanted(self, config: NodeConfig) -> list[str]:
         """Return the outputs that somebody subscribes, or all of them if not lazy."""
         tf_off = {TF} if config.tf.frames == 'off' else set()
-        return [
+        wanted = [
             name for name, publisher in self._publishers.items() if name not in tf_off
             and (not config.lazy or publisher.get_subscription_count())]
+        self._humans.switch(config.rep155)
+        if config.rep155 and (not config.lazy or self._humans.is_heard()):
+            wanted.append(HUMANS)
+        return wanted
 
     def publish(self, outputs: Iterable[Output]) -> None:
         """Publish messages; may be called from any thread."""
         for name, message in outputs:
-            self._publishers[name].publish(message)
+            if name == HUMANS:
+                self._humans.publish(message)
+            else:
+                self._publishers[name].publish(message)
 
     def publish_model(self, model: BodyModel) -> None:
         """Latch what a receiver of ~/bodies needs to know, where pop_msgs is installed."""
@@ -56,4 +66,6 @@ class NodeOutputs:
             texts.append('pop_msgs is not installed: no ~/bodies and no ~/body_model')
         if TF not in self._publishers:
             texts.append('tf2_msgs is not installed: nothing goes to /tf')
+        texts += [f'{reason}: no ~/{name}' for name, reason in MISFITS.items()
+                  if 'version' in reason]
         return tuple(texts)

@@ -11,6 +11,7 @@ from pop_ros.body_messages import OUTPUT_TYPES
 from pop_ros.camera_presets import CAMERA_PRESETS
 from pop_ros.from_messages import COLOR_CHANNELS, DEPTH_TYPES
 from pop_ros.inputs import TRANSPORTS
+from pop_ros.interop import INTEROP
 from pop_ros.node_config import NodeConfig
 
 PAGE = (ROOT / 'docs' / 'ros_api.md').read_text(encoding='utf-8')
@@ -23,8 +24,8 @@ def first_cells(section: str) -> set[str]:
 
 
 def test_outputs_are_those_of_the_node() -> None:
-    # Whether or not pop_msgs and tf2_msgs are installed here, the page tells of their topics.
-    names = {*OUTPUT_TYPES, 'bodies', 'body_model'} - {'tf'}
+    # Whichever message packages are installed here, the page tells of all their topics.
+    names = {*OUTPUT_TYPES, *INTEROP, 'bodies', 'body_model'} - {'tf'}
     assert first_cells('Outputs') == {f'~/{name}' for name in names} | {'/tf', '/diagnostics'}
 
 
