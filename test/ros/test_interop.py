@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ from support import interop_sender
 from support.estimates import CAMERA, estimate
 from support.interop_sender import FRAME_ID, PEOPLE, STAMP_NS
 from support.message_packages import environment_with
+from support.node import RunningNode
+from support.recording import record
 
 from pop_core.body.default_body import default_body
 from pop_core.body.joints import COCO_17_NAMES, JOINT_INDEX
@@ -247,3 +250,41 @@ def test_a_package_that_is_not_there_or_of_another_version_is_said_so() -> None:
     assert misfit('no_such_msgs', fails) == 'no_such_msgs is not installed'
     assert misfit('std_msgs', fails).startswith('std_msgs is of another version: ')
     assert misfit('std_msgs', lambda module: module.Header()) == ''
+
+
+def test_the_node_tells_of_one_person_by_one_number_on_every_output(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    environment = environment_with(
+        'pop_msgs', 'tf2_msgs', 'hri_msgs', 'zed_msgs', 'vision_msgs', 'yolo_msgs')
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    recording = record(tmp_path, n_frames=1, rate_hz=1.0)
+    bag = recording.write(tmp_path / 'in.mcap', '16UC1')
+    node = RunningNode('--keypoints', 'json', '--keypoints-dir', str(recording.keypoints),
+                       '--ros-args', '-p', 'rep155:=true')
+    script = interop_sender.__file__.replace('interop_sender', 'outputs_listener')
+    listener = subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True)
+    try:
+        node.wait_for('ready after')
+        subprocess.run(
+            [sys.executable, '-m', 'pop_ros.cli', 'replay', str(bag), '--out',
+             str(tmp_path / 'out'), '--node-running'],
+            check=True, capture_output=True, timeout=120)
+        told, _ = listener.communicate(timeout=30)
+    finally:
+        listener.kill()
+        code = node.end()
+    assert code == 0, node.output
+    found = json.loads(told)
+    body, = found['/pop/bodies']['bodies']
+    number, at = body['id'], xyz(body['joints'][0]['pose']['position'])
+    assert np.linalg.norm(at - recording.pelvis(recording.stamps[0])) < 0.05
+    detection, = found['/pop/vision_detections']['detections']
+    seen, = found['/pop/yolo_detections']['detections']
+    thing, = found['/pop/zed_objects']['objects']
+    assert detection['id'] == seen['id'] == f'{number}'
+    assert (thing['label_id'], thing['label']) == (number, f'Body_{number}')
+    assert found['/humans/bodies/tracked']['ids'] == [f'pop_{number}']
+    np.testing.assert_allclose(xyz(detection['results'][0]['pose']['pose']['position']), at)
+    np.testing.assert_allclose(thing['skeleton_3d']['keypoints'][0]['kp'], at, rtol=1e-5)
