@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.keypoints.lifting import LiftingConfig
+from pop_core.keypoints.people_selection import PeopleConfig
+from pop_core.keypoints.region import RegionConfig
 from pop_core.retrieval.retrieve import RetrievalConfig
 from pop_core.segmentation.body_segmentation import SegmentationConfig
 from pop_core.settings import setting
@@ -31,6 +33,8 @@ class PipelineConfig:
         about='Largest distance of the best library pose to the lifted joints, root mean square.')
     use_ground: bool = setting(
         True, about='Whether the floor is looked for: feet stand on it and never below it.')
+    region: RegionConfig = field(default_factory=RegionConfig)
+    people: PeopleConfig = field(default_factory=PeopleConfig)
     lifting: LiftingConfig = field(default_factory=LiftingConfig)
     retrieval: RetrievalConfig = field(default_factory=RetrievalConfig)
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)

@@ -30,6 +30,7 @@ class EstimateStatus(Enum):
         'fewer lifted joints than min_joints: move closer or check the depth registration'
     )
     TOO_FAR = 'beyond max_range_m'
+    OUTSIDE = 'outside the region of interest (region.*)'
     NO_SUPPORT = 'the fitted body does not explain the depth of its pixels: probably no person'
     NO_SKELETON = (
         'no human pose comes near the lifted joints: the keypoints are not those of one person'

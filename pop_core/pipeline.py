@@ -24,6 +24,7 @@ from pop_core.geometry.camera import Camera
 from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.keypoints.lifting import lift_keypoints
+from pop_core.keypoints.region import is_inside
 from pop_core.keypoints.undistortion import undistort_detection
 from pop_core.rendering.depth_renderer import render_depth
 from pop_core.retrieval.candidate import PoseCandidate
@@ -222,6 +223,8 @@ class BodyPipeline:
             return EstimateStatus.NO_SKELETON
         if lifted.distance_m > self.config.max_range_m:
             return EstimateStatus.TOO_FAR
+        if not is_inside(lifted, self.config.region):
+            return EstimateStatus.OUTSIDE
         return EstimateStatus.OK
 
 

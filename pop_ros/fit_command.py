@@ -67,7 +67,7 @@ def fit(
     from pop_ros.sources import make_pipeline
 
     config = with_flags(PipelineConfig(), settings or [])
-    source = FrameKeypoints(keypoints, decoder)
+    source = FrameKeypoints(keypoints, decoder, config.people)
     frames, bad = _collect(inputs)
     if frames:
         with first_use_progress() as progress:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pop_ros.sources import SOURCES, SourceError, make_detector
+from pop_ros.keypoint_sources import SOURCES, SourceError, keep_people, make_detector
 
 if TYPE_CHECKING:
     from pop_core.keypoints.detection import Detection, KeypointDetector
+    from pop_core.keypoints.people_selection import PeopleConfig
     from pop_core.rgbd import RgbdFrame
     from pop_ros.frame_folder import FrameFolder
 
@@ -15,7 +16,9 @@ if TYPE_CHECKING:
 class FrameKeypoints:
     """A keypoint source that is told which folder the next frame comes from."""
 
-    def __init__(self, source: str | None, decoder: str | None) -> None:
+    def __init__(
+        self, source: str | None, decoder: str | None, people: PeopleConfig | None = None
+    ) -> None:
         """Take what the user said; None means each frame's file.
 
         Raises:
@@ -24,6 +27,8 @@ class FrameKeypoints:
         self._network: KeypointDetector | None = None
         if source not in (None, 'json'):
             self._network = make_detector(str(source), decoder=decoder)
+            if people is not None:
+                keep_people(self._network, people)
         self._current: KeypointDetector | None = None
 
     def choose(self, folder: FrameFolder) -> None:

@@ -14,6 +14,7 @@ from pop_core.pipeline import BodyPipeline
 from pop_core.rgbd import RgbdFrame
 from pop_ros.body_messages import RECORDED_TYPES, BodyMessages, Output
 from pop_ros.frame_maker import FrameMaker
+from pop_ros.keypoint_sources import keep_people
 from pop_ros.node_config import NodeConfig
 from pop_ros.sources import make_pipeline
 from pop_ros.static_frames import StaticFrames, parse_extrinsics
@@ -53,6 +54,7 @@ class FrameFitter:
         Raises:
             PopError: If one of them cannot be loaded.
         """
+        keep_people(detector, pipeline_config.people)
         self._pipeline = make_pipeline(detector, pipeline_config, progress=progress)
         self._messages = BodyMessages(self._pipeline.model, config)
         self._maker = FrameMaker(frames or StaticFrames())
@@ -66,6 +68,7 @@ class FrameFitter:
     def configure(self, pipeline_config: PipelineConfig, config: NodeConfig) -> None:
         """Take over changed settings; model, library and keypoint source stay loaded."""
         old = self._pipeline
+        keep_people(old.detector, pipeline_config.people)
         self._pipeline = BodyPipeline(
             old.model, old.library, old.detector, pipeline_config, old.fitter.prior)
         self._messages.configure(config)

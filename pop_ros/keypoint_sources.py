@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pop_core.errors import PopError
 
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from pop_core.keypoints.boxes import BoxDetector, TopDownDetector
     from pop_core.keypoints.detection import KeypointDetector
     from pop_core.keypoints.onnx_detector import OnnxSource
+    from pop_core.keypoints.people_selection import PeopleConfig
 
     Source = KeypointDetector | BoxDetector | TopDownDetector
 
@@ -81,12 +82,24 @@ def split_sources(spec: str) -> list[str]:
 
 def reasons(detector: object) -> list[str]:
     """Return a sentence about each network: how it is read, and why so."""
+    return [str(part.reason) for part in _parts(detector) if hasattr(part, 'reason')]
+
+
+def keep_people(detector: object, config: PeopleConfig) -> None:
+    """Tell every network of a source which of the people it finds are kept."""
+    from pop_core.keypoints.onnx_detector import OnnxKeypointDetector, OnnxTopDownDetector
+
+    for part in _parts(detector):
+        if isinstance(part, OnnxKeypointDetector | OnnxTopDownDetector):
+            part.config = config
+
+
+def _parts(detector: object) -> Sequence[Any]:
     from pop_core.keypoints.fusion import FusedDetector
 
-    parts: Sequence[object] = [detector]
     if isinstance(detector, FusedDetector):
-        parts = [*detector.people, *detector.boxes, *detector.top_down]
-    return [str(part.reason) for part in parts if hasattr(part, 'reason')]
+        return [*detector.people, *detector.boxes, *detector.top_down]
+    return [detector]
 
 
 def _with_decoder(words: Sequence[str], decoder: str) -> list[str]:

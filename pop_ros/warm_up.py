@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pop_core.body.kinematics import attached_positions
@@ -9,6 +11,7 @@ from pop_core.body.model import BodyModel, rest_parameters, shared_points
 from pop_core.body.skinning import vertices
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.detection import Detection
+from pop_core.keypoints.region import RegionConfig
 from pop_core.pipeline import BodyPipeline
 from pop_core.rendering.depth_renderer import render_depth
 from pop_core.rgbd import RgbdFrame
@@ -34,9 +37,10 @@ class OnePerson:
 def warm_up(pipeline: BodyPipeline) -> None:
     """Fit a small synthetic person once, so that no real frame pays for compilation."""
     frame, detection = small_scene(pipeline.model)
+    # Whatever the region of interest, this person must be fitted.
+    config = replace(pipeline.config, region=RegionConfig(), max_range_m=2 * PLACE[2])
     BodyPipeline(
-        pipeline.model, pipeline.library, OnePerson(detection), pipeline.config,
-        pipeline.fitter.prior,
+        pipeline.model, pipeline.library, OnePerson(detection), config, pipeline.fitter.prior,
     ).process(frame)
 
 

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from pop_core.body.default_body import default_body
+from pop_core.config import PipelineConfig
 from pop_core.estimate import EstimateStatus, FrameResult, JointState
 from pop_core.keypoints.detection import Detection
+from pop_core.keypoints.region import RegionConfig
 from pop_core.pipeline import BodyPipeline
 from pop_core.retrieval.default_library import default_library
 from pop_core.rgbd import RgbdFrame
@@ -94,3 +96,16 @@ def test_keypoints_on_an_empty_wall_are_nobody(scene: SyntheticScene) -> None:
     found = run(wall, [d for d in scene.detections() if d is not None])
     for body in found.bodies:
         assert np.isfinite(body.vertices).all()
+
+
+def test_people_outside_the_region_of_interest_are_left_alone(
+    scene: SyntheticScene, result: FrameResult
+) -> None:
+    near, far = (body.joints[0, 2] for body in result.bodies)
+    config = PipelineConfig(region=RegionConfig(z_max_m=float(near + far) / 2))
+    detections = [d for d in scene.detections() if d is not None]
+    pipeline = BodyPipeline(default_body(), default_library(), Given(detections), config)
+    found = pipeline.process(scene.frame)
+    assert len(found.bodies) == 1
+    np.testing.assert_allclose(found.bodies[0].joints, result.bodies[0].joints, atol=1e-9)
+    assert sorted(status.name for status in found.statuses) == ['OK', 'OUTSIDE']
