@@ -62,6 +62,8 @@ COMMANDS = (
             'Inspect, import and picture body models.'),
     Command('library', 'pop_ros.library_commands', 'app',
             'Build and inspect pose libraries.'),
+    Command('models', 'pop_ros.models_commands', 'app',
+            'List, fetch and check networks that find keypoints.'),
     Command('doctor', 'pop_ros.doctor_command', 'doctor',
             'Check middleware, caches, message packages and cameras; say what to do.'),
     Command('version', 'pop_ros.version_command', 'version',

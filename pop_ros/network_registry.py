@@ -16,8 +16,6 @@ from typing import Any
 from pop_core.errors import PopError
 from pop_core.retrieval.default_library import cache_folder
 
-HASH_DIGITS = 64
-
 
 class NetworkFileError(PopError):
     """A published network that is not there, or not the one that was published."""
@@ -95,8 +93,12 @@ def known_entry(name: str) -> NetworkEntry:
     return entry
 
 
-def verified_network(entry: NetworkEntry) -> bytes:
+def verified_network(entry: NetworkEntry, download_sha256: str | None = None) -> bytes:
     """Return a fetched network, which is the one that was verified.
+
+    Args:
+        entry: Which one.
+        download_sha256: What its download must have hashed to, where the user says so.
 
     Raises:
         NetworkFileError: If it was not fetched, or is not that one any more.
@@ -108,12 +110,12 @@ def verified_network(entry: NetworkEntry) -> bytes:
         raise NetworkFileError(
             f'{entry.name}: expected {entry.path}, found none: run `pop models fetch '
             f'{entry.name}`') from None
-    wanted = _wanted(entry, recorded)
+    wanted = _wanted(entry, recorded, download_sha256 or entry.sha256)
     found = hashlib.sha256(content).hexdigest()
     if wanted is None or found != wanted:
         raise NetworkFileError(
-            f'{entry.path}: expected SHA-256 {wanted}, found {found}: it was changed after it was '
-            f'fetched; run `pop models fetch {entry.name}`')
+            f'{entry.path}: expected SHA-256 {wanted or entry.sha256}, found {found}: it is not '
+            f'what was verified; run `pop models fetch {entry.name}`')
     return content
 
 
@@ -124,13 +126,11 @@ def save_record(entry: NetworkEntry, content: bytes, download_sha256: str) -> No
     entry.record.write_text(json.dumps(document) + '\n', encoding='utf-8')
 
 
-def _wanted(entry: NetworkEntry, recorded: Any) -> str | None:
-    """Return the hash that a cached network must have; None if its record is not of this entry."""
+def _wanted(entry: NetworkEntry, recorded: Any, download_sha256: str | None) -> str | None:
+    """Return what a cached network must hash to; None if it is of another download."""
     if not isinstance(recorded, dict):
         return None
-    sha256, download = recorded.get('sha256'), recorded.get('download_sha256')
-    if not isinstance(sha256, str) or len(sha256) != HASH_DIGITS:
+    sha256, download = (str(recorded.get(key)) for key in ('sha256', 'download_sha256'))
+    if download_sha256 not in (None, download):
         return None
-    if entry.sha256 is not None and download != entry.sha256:
-        return None
-    return sha256 if entry.member is not None else str(download)
+    return download if entry.member is None else sha256
