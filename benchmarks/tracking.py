@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from itertools import islice
 from pathlib import Path
 
 from rich.console import Console
@@ -41,6 +42,7 @@ from pop_core.synthesis.sequence_names import SequenceKind
 from pop_core.tracking.tracking_config import TrackingConfig
 
 FIRST_SEED = 20_000  # far from the seeds of tests, training and single scenes
+WARM_FRAMES = 3
 
 
 def run(argv: list[str]) -> int:
@@ -112,7 +114,7 @@ def measure(options: argparse.Namespace, console: Console) -> list[FollowedSeque
     work = [(kind, options.seed + k) for kind in options.kinds for k in range(options.seeds)]
     columns = (TextColumn('{task.description}'), BarColumn(), MofNCompleteColumn(),
                TimeRemainingColumn())
-    sequences = []
+    sequences, warm = [], False
     with Progress(*columns, console=console) as progress:
         task = progress.add_task('frames', total=len(work) * options.frames)
         for number, (kind, seed) in enumerate(work):
@@ -121,6 +123,11 @@ def measure(options: argparse.Namespace, console: Console) -> list[FollowedSeque
             if not path.is_file():
                 film = SequenceConfig(
                     SequenceKind(kind), options.frames, options.rate, options.sensor, colour=False)
+                if not warm:  # compilation belongs to nobody's time
+                    methods = make_methods(options.methods, pipeline, tracking)
+                    frames = islice(film_sequence(model, seed, film), WARM_FRAMES)
+                    follow(frames, options.rate, methods, detector, lambda: None)
+                    warm = True
                 methods = make_methods(options.methods, pipeline, tracking)
                 truth, tracks = follow(
                     film_sequence(model, seed, film), options.rate, methods, detector,

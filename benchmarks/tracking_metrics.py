@@ -75,15 +75,20 @@ def correspond(truth: TruthTable, tracks: TrackTable) -> Int[np.ndarray, 'n']:
         t, h = np.flatnonzero(truth.frame == k), np.flatnonzero(tracks.frame == k)
         distance = np.linalg.norm(
             truth.joints[t, None, 0] - tracks.joints[None, h, 0], axis=2)
-        kept = np.array([[latest.get(a) == b for b in tracks.id[h]] for a in truth.id[t]])
-        cost = np.where(distance <= GATE_M, distance, FORBIDDEN)
-        if len(t) and len(h):
-            cost = np.where(kept & (distance <= GATE_M), distance - 10 * GATE_M, cost)
-        for a, b in zip(*linear_sum_assignment(cost), strict=True):
-            if cost[a, b] < FORBIDDEN:
-                rows[t[a]] = h[b]
-                latest[int(truth.id[t[a]])] = int(tracks.id[h[b]])
+        known = np.array([latest.get(int(person), -1) for person in truth.id[t]], dtype=np.int64)
+        kept = _one_to_one((known[:, None] == tracks.id[h]) & (distance <= GATE_M))
+        free = ~(kept.any(axis=1)[:, None] | kept.any(axis=0)) & (distance <= GATE_M)
+        a, b = linear_sum_assignment(np.where(free, distance, FORBIDDEN))
+        kept[a[free[a, b]], b[free[a, b]]] = True
+        for person, body in np.argwhere(kept):
+            rows[t[person]] = h[body]
+            latest[int(truth.id[t[person]])] = int(tracks.id[h[body]])
     return rows
+
+
+def _one_to_one(pairs: Bool[np.ndarray, 'p b']) -> Bool[np.ndarray, 'p b']:
+    """Return pairs of which each body belongs to one person, the first that claims it."""
+    return pairs & (np.cumsum(pairs, axis=0) == 1)
 
 
 def mot_scores(

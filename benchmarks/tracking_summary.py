@@ -23,8 +23,8 @@ from pop_core.estimate import JointState
 
 # Name and longest time since the camera saw a joint [s]; the first is of joints it sees now.
 SINCE_SEEN = (
-    ('seen now', 0.0), ('hidden for up to 0.5 s', 0.5), ('0.5 to 1 s', 1.0), ('1 to 2 s', 2.0),
-    ('2 to 3 s', 3.0), ('longer', 1e9), ('never seen yet', np.inf))
+    ('seen now', 0.0), ('up to 0.5 s', 0.5), ('0.5 to 1 s', 1.0), ('1 to 2 s', 2.0),
+    ('2 to 3 s', 3.0), ('over 3 s', 1e9), ('never seen yet', np.inf))
 STILL = 'still'
 
 
@@ -50,7 +50,7 @@ def _rows() -> tuple[Row, ...]:
         Row(f'{part} joints, {statistic}', (f'{part}_m', statistic), '{:.1f} mm', 1e3)
         for part in ('visible', 'occluded') for statistic in ('mean', 'median', 'p90')]
     times = [
-        Row(f'  {label}, mean', ('since_seen_m', label, 'mean'), '{:.1f} mm', 1e3)
+        Row(f'  {label}', ('since_seen_m', label, 'mean'), '{:.1f} mm', 1e3)
         for label, _ in SINCE_SEEN]
     spent = [
         Row(f'per frame, {clock} time, {statistic}', (key, statistic), '{:.0f} ms')
