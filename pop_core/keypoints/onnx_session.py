@@ -48,6 +48,7 @@ class OnnxSession:
         self.where = where
         self._session = _load(content, where)
         self.spec = _spec(self._session)
+        self.facts = dict(self._session.get_modelmeta().custom_metadata_map)
         for tensor in (*self.spec.inputs, *self.spec.outputs):
             if math.prod(size or 1 for size in tensor.shape) > LARGEST_TENSOR:
                 raise NetworkShapeError(

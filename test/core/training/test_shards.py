@@ -3,10 +3,7 @@
 import numpy as np
 import pytest
 
-from pop_core.body.default_body import default_body
 from pop_core.keypoints.body_parts import CLASS_MIRROR, CLASS_OF_LABEL, LABEL_OF_CLASS
-from pop_core.synthesis.coarse_body import coarse_body
-from pop_core.synthesis.training_scenes import TrainingScenes
 from pop_core.training.shards import (
     OWNER_SHIFT,
     ShardError,
@@ -17,32 +14,25 @@ from pop_core.training.shards import (
 )
 
 
-@pytest.fixture(scope='module')
-def scenes():
-    body = coarse_body(default_body())
-    stream = TrainingScenes(body, seed=1, width=96, height=80, focal_px=80.0)
-    return [stream.draw() for _ in range(6)]
-
-
-def test_a_saved_shard_is_loaded_unchanged(scenes, tmp_path):
-    shard = pack(scenes)
+def test_a_saved_shard_is_loaded_unchanged(small_scenes, tmp_path):
+    shard = pack(small_scenes)
     save_shard(shard, tmp_path / 'a.npz')
     loaded = load_shard(shard_paths(tmp_path)[0])
     for name in ('depth_mm', 'labels', 'points', 'visible', 'lens'):
         np.testing.assert_array_equal(getattr(loaded, name), getattr(shard, name))
 
 
-def test_labels_tell_part_and_person_apart(scenes):
-    shard = pack(scenes)
-    for row, scene in enumerate(scenes):
+def test_labels_tell_part_and_person_apart(small_scenes):
+    shard = pack(small_scenes)
+    for row, scene in enumerate(small_scenes):
         labels = shard.labels[row]
         np.testing.assert_array_equal((labels >> OWNER_SHIFT).astype(int) - 1, scene.owner)
         np.testing.assert_array_equal(labels & 15, CLASS_OF_LABEL[scene.part_labels])
 
 
-def test_depth_is_kept_to_the_millimetre(scenes):
-    shard = pack(scenes)
-    depth_m = np.nan_to_num(np.stack([scene.depth_m for scene in scenes]))
+def test_depth_is_kept_to_the_millimetre(small_scenes):
+    shard = pack(small_scenes)
+    depth_m = np.nan_to_num(np.stack([scene.depth_m for scene in small_scenes]))
     np.testing.assert_allclose(shard.depth_mm / 1e3, depth_m, atol=6e-4)
 
 

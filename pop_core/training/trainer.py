@@ -1,0 +1,179 @@
+"""One optimisation of the depth network: step, learning rate, averaged weights, state on disk."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from pop_core.errors import PopError
+from pop_core.training.losses import losses
+from pop_core.training.network import DepthNet, NetworkConfig
+from pop_core.training.targets import Batch, make_targets
+
+
+class CheckpointError(PopError):
+    """A file of weights that is damaged or of another network."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrainConfig:
+    """How the network is trained.
+
+    Args:
+        batch: Images per step.
+        rate: Largest learning rate of AdamW (Loshchilov and Hutter 2019).
+        decay: Weight decay.
+        warm_up: Steps over which the rate rises.
+        average: Share of the old average kept per step.
+        curriculum: Images over which scenes go from hardly hidden people to all.
+        first_hidden: Largest share of hidden joints at the beginning.
+        clip: Largest norm of the gradient.
+    """
+
+    batch: int = 32
+    rate: float = 2e-3
+    decay: float = 0.02
+    warm_up: int = 200
+    average: float = 0.998
+    curriculum: int = 10_000
+    first_hidden: float = 0.3
+    clip: float = 5.0
+
+
+class Trainer:
+    """Network, averaged network and optimiser."""
+
+    def __init__(
+        self, device: torch.device, network: NetworkConfig | None = None,
+        config: TrainConfig | None = None,
+    ) -> None:
+        """Begin with random weights."""
+        self.device = device
+        self.config = config or TrainConfig()
+        self.network = DepthNet(network).to(device, memory_format=torch.channels_last)
+        self.averaged = deepcopy(self.network).eval()
+        self.optimiser = torch.optim.AdamW(
+            self.network.parameters(), self.config.rate, weight_decay=self.config.decay,
+            fused=True)
+        self.steps = 0
+        self.images = 0
+        self.history: list[dict[str, float]] = []
+
+    def step(self, batch: Batch, rate_factor: float = 1.0) -> dict[str, Tensor]:
+        """Learn from a batch; return the terms of the loss, on the device.
+
+        Args:
+            batch: Images of the network's input size.
+            rate_factor: Multiplies the learning rate, for the end of a training.
+        """
+        rate = self.config.rate * min(1.0, (self.steps + 1) / self.config.warm_up) * rate_factor
+        for group in self.optimiser.param_groups:
+            group['lr'] = rate
+        targets = make_targets(batch)
+        self.network.train()
+        # bfloat16 needs no scaling of the loss; on CPUs it is slower than float32 here.
+        with torch.autocast(self.device.type, torch.bfloat16, self.device.type == 'cuda'):
+            maps = self.network(batch.depth_m[:, None].contiguous(
+                memory_format=torch.channels_last))
+        terms = losses(maps, targets)
+        total = torch.stack(list(terms.values())).sum()
+        self.optimiser.zero_grad(set_to_none=True)
+        total.backward()
+        torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.config.clip)
+        self.optimiser.step()
+        self.steps += 1
+        self.images += len(batch.depth_m)
+        self._average()
+        return {name: term.detach() for name, term in terms.items()}
+
+    @property
+    def most_hidden(self) -> float:
+        """Return the largest share of hidden joints that the curriculum allows by now."""
+        first = self.config.first_hidden
+        return min(1.0, first + (1.0 - first) * self.images / max(self.config.curriculum, 1))
+
+    @torch.no_grad()
+    def _average(self) -> None:
+        keep = min(self.config.average, (1 + self.steps) / (10 + self.steps))
+        pairs = zip(self.averaged.parameters(), self.network.parameters(), strict=True)
+        for average, current in pairs:
+            average.lerp_(current, 1.0 - keep)
+        for kept, buffer in zip(self.averaged.buffers(), self.network.buffers(), strict=True):
+            kept.copy_(buffer)
+
+    def save(self, path: Path) -> None:
+        """Write everything that a later run needs to go on."""
+        _write(path, {
+            'network_config': asdict(self.network.config), 'network': self.network.state_dict(),
+            'averaged': self.averaged.state_dict(), 'optimiser': self.optimiser.state_dict(),
+            'steps': self.steps, 'images': self.images, 'history': self.history,
+        })
+
+    def save_weights(self, path: Path) -> None:
+        """Write the averaged weights alone, in half precision: small enough to be kept."""
+        state = self.averaged.state_dict()
+        half = {name: value.half() if value.is_floating_point() else value
+                for name, value in state.items()}
+        _write(path, {
+            'network_config': asdict(self.network.config), 'averaged': half,
+            'images': self.images, 'history': self.history,
+        })
+
+    def load(self, path: Path) -> None:
+        """Go on from a file written by `save`, or begin with the weights of `save_weights`.
+
+        Raises:
+            CheckpointError: If it is no checkpoint of a network of this size.
+        """
+        state = read_checkpoint(path)
+        try:
+            self.averaged.load_state_dict(state['averaged'])
+            self.network.load_state_dict(state.get('network', state['averaged']))
+            if 'optimiser' in state:
+                self.optimiser.load_state_dict(state['optimiser'])
+        except (RuntimeError, ValueError) as error:
+            raise CheckpointError(
+                f'{path}: expected weights of a network as {self.network.config}, found '
+                f'{state["network_config"]}') from error
+        self.steps, self.images = state.get('steps', 0), state['images']
+        self.history = list(state['history'])
+
+
+def load_network(path: Path) -> DepthNet:
+    """Return the averaged network of a checkpoint, ready to be used on the CPU.
+
+    Raises:
+        CheckpointError: If it is no checkpoint.
+    """
+    state = read_checkpoint(path)
+    network = DepthNet(NetworkConfig(**state['network_config']))
+    network.load_state_dict(state['averaged'])
+    return network.eval()
+
+
+def read_checkpoint(path: Path) -> dict[str, Any]:
+    """Return the content of a checkpoint; nothing but tensors and numbers is ever read.
+
+    Raises:
+        CheckpointError: If it is none.
+    """
+    try:
+        state = torch.load(path, map_location='cpu', weights_only=True)
+    except Exception as error:  # noqa: BLE001 - torch tells damaged files by many exceptions
+        reason = ' '.join(str(error).split())[:120]
+        raise CheckpointError(f'{path}: expected a checkpoint, found: {reason}') from None
+    if not isinstance(state, dict) or not {'network_config', 'averaged', 'history'} <= set(state):
+        raise CheckpointError(f'{path}: expected a checkpoint of the depth network, found another')
+    return state
+
+
+def _write(path: Path, state: dict[str, Any]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_suffix('.part')
+    torch.save(state, part)
+    part.replace(path)

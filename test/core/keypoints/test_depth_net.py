@@ -1,0 +1,163 @@
+"""People out of a depth network's maps: perfect maps give back the truth."""
+
+import numpy as np
+import pytest
+from support.depth_maps import truth_maps
+
+from pop_core.body.default_body import default_body
+from pop_core.geometry.camera import Camera
+from pop_core.keypoints.canonical_depth import canonical_depth, canonical_view
+from pop_core.keypoints.depth_net import cell_depth, decode
+from pop_core.keypoints.depth_votes import Cells, DepthNetConfig, fuse_votes, group_cells
+from pop_core.rgbd import RgbdFrame
+from pop_core.synthesis.coarse_body import coarse_body
+from pop_core.synthesis.training_scenes import TrainingScenes
+
+VGA = Camera(640, 480, 525.0, 525.0, 319.5, 239.5)
+
+
+@pytest.fixture(scope='module')
+def scenes():
+    stream = TrainingScenes(coarse_body(default_body()), seed=21)
+    return [stream.draw() for _ in range(24)]
+
+
+def detections(scene):
+    """Return what perfect maps of a scene are decoded into; its view is its own camera."""
+    camera = scene.camera
+    view = canonical_view(camera, camera.fx)
+    if (view.camera.width, view.camera.height) != (camera.width, camera.height):
+        raise AssertionError('scenes are drawn in the size of the network')
+    frame = RgbdFrame(np.zeros((*scene.depth_m.shape, 3), np.uint8), scene.depth_m, camera)
+    depth_m = canonical_depth(scene.depth_m, view)
+    return decode(truth_maps(scene), np.nan_to_num(depth_m), view, frame, DepthNetConfig())
+
+
+def shown_people(scene, least_m2=0.06):
+    """Return people of whom the sensor measures twice the surface that makes a person."""
+    area_m2 = (np.nan_to_num(scene.depth_m) / scene.camera.fx) ** 2
+    return [k for k in range(len(scene.people)) if area_m2[scene.owner == k].sum() > least_m2]
+
+
+def test_perfect_maps_give_everybody_once(scenes):
+    for scene in scenes:
+        wanted = len(shown_people(scene))
+        there = sum((scene.owner == k).any() for k in range(len(scene.people)))
+        assert wanted <= len(detections(scene)) <= there
+
+
+def test_perfect_maps_give_joints_where_they_are_hidden_ones_too(scenes):
+    checked = 0
+    for scene in scenes:
+        found = detections(scene)
+        for k in shown_people(scene):
+            person = scene.people[k]
+            best = max(found, key=lambda d: (d.person_mask & (scene.owner == k)).sum())
+            known = np.isfinite(best.joint_depth_m)
+            points = scene.camera.unproject(
+                best.keypoints_px[known], best.joint_depth_m[known])
+            error = np.linalg.norm(points - person.shared_points[known], axis=1)
+            # Votes are float32, and holes filled from beside move a cell's surface.
+            assert np.median(error) < 0.03
+            np.testing.assert_array_equal(best.visible[known] > 0.5, person.visible[known])
+            checked += known.sum()
+    assert checked > 200
+
+
+def test_masks_and_parts_cover_the_people_and_nothing_else(scenes):
+    hit = said = there = right = 0
+    for scene in scenes:
+        found = detections(scene)
+        mask = np.any([d.person_mask for d in found], axis=0) if found else scene.owner > 90
+        truth = (scene.owner >= 0) & np.isfinite(scene.depth_m)
+        hit, said, there = hit + (mask & truth).sum(), said + mask.sum(), there + truth.sum()
+        for detection in found:
+            own = detection.person_mask & truth
+            right += (detection.part_labels >= 0)[own].sum()
+            np.testing.assert_array_equal(detection.part_labels >= 0, detection.person_mask)
+    assert hit / said > 0.9
+    assert hit / there > 0.85
+    assert right > 1000
+
+
+def test_an_empty_image_shows_nobody(scenes):
+    empty = next(scene for scene in scenes if not (scene.owner >= 0).any())
+    assert detections(empty) == []
+
+
+def two_trunks(gap_m, rng):
+    """Return cells of two equal people beside each other, votes with a centimetre of noise."""
+    body = rng.normal(0, 0.3, (15, 3)) + [0, 0, 3.0]
+    centres = np.repeat([[0.0, 0, 0], [gap_m, 0, 0]], 60, axis=0)
+    joints = body + centres[:, None] + rng.normal(0, 0.01, (120, 15, 3))
+    ones = np.ones((120, 15))
+    return Cells(np.arange(120), np.arange(120), np.full(120, 2.9), np.full(120, 0.9), joints,
+                 0.03 * ones, 0.5 * ones)
+
+
+@pytest.mark.parametrize('gap_m', [0.45, 0.6, 1.0])
+def test_trunks_apart_are_two_people(gap_m):
+    cells = two_trunks(gap_m, np.random.default_rng(0))
+    member = group_cells(cells, np.full(120, 1e-3), DepthNetConfig())
+    assert set(member[:60]) != set(member[60:])
+    assert member.max() == 1
+
+
+def test_trunks_in_one_place_are_one_person():
+    cells = two_trunks(0.05, np.random.default_rng(0))
+    assert group_cells(cells, np.full(120, 1e-3), DepthNetConfig()).tolist() == [0] * 120
+
+
+def test_a_speck_is_nobody():
+    cells = two_trunks(1.0, np.random.default_rng(0))
+    member = group_cells(cells, np.full(120, 1e-5), DepthNetConfig())
+    assert member.tolist() == [-1] * 120
+
+
+def test_wild_votes_hardly_move_a_joint():
+    rng = np.random.default_rng(1)
+    cells = two_trunks(0.0, rng)
+    truth = fuse_votes(cells).joints
+    cells.joints[:20] += rng.normal(0, 1.0, (20, 15, 3))
+    np.testing.assert_allclose(fuse_votes(cells).joints, truth, atol=0.05)
+
+
+def test_the_surest_cells_decide():
+    cells = two_trunks(0.4, np.random.default_rng(2))
+    cells.sigma_m[:60], cells.sigma_m[60:] = 0.01, 0.5
+    sure = fuse_votes(cells.chosen(np.arange(60))).joints
+    np.testing.assert_allclose(fuse_votes(cells).joints, sure, atol=0.01)
+
+
+@pytest.mark.parametrize('camera', [
+    VGA,
+    Camera(1280, 720, 900.0, 905.0, 610.0, 380.0),
+    Camera(640, 480, 525.0, 525.0, 319.5, 239.5, 'plumb_bob',
+           np.array([0.1, -0.2, 0.001, 0.001, 0.05])),
+], ids=['vga', 'hd', 'distorted'])
+def test_canonical_pixels_and_measured_pixels_lie_on_the_same_rays(camera):
+    view = canonical_view(camera, 160.0)
+    assert view.camera.width % 32 == 0
+    assert view.camera.height % 32 == 0
+    grid, rays = view.camera.ray_grid(), camera.ray_grid()
+    inside = view.source_v >= 0
+    assert inside.mean() > 0.6
+    there = rays[view.source_v[inside], view.source_u[inside]]
+    np.testing.assert_allclose(there, grid[inside], atol=1.0 / camera.fx)  # half a pixel, doubled
+    v = np.rint(view.pixel_v).astype(int).clip(0, view.camera.height - 1)
+    u = np.rint(view.pixel_u).astype(int).clip(0, view.camera.width - 1)
+    np.testing.assert_allclose(grid[v, u], rays, atol=1.0 / 160.0)
+
+
+def test_a_missing_pixel_takes_the_depth_beside_it():
+    depth_m = np.full((480, 640), 2.0, dtype=np.float32)
+    view = canonical_view(VGA, 160.0)
+    depth_m[view.source_v.max(axis=1)[20], view.source_u.max(axis=0)[30]] = np.nan
+    seen = canonical_depth(depth_m, view)
+    assert (seen[view.source_v >= 0] == 2.0).all()
+
+
+def test_the_depth_of_a_cell_is_its_nearest():
+    depth_m = np.zeros((8, 8), dtype=np.float32)
+    depth_m[1, 2], depth_m[2, 1], depth_m[7, 7] = 2.0, 1.5, 3.0
+    np.testing.assert_array_equal(cell_depth(depth_m, 4), [[1.5, np.inf], [np.inf, 3.0]])

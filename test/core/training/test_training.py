@@ -1,0 +1,192 @@
+"""The network learns, goes on where it stopped, and means the same as ONNX."""
+
+import numpy as np
+import pytest
+
+from pop_core.keypoints.onnx_session import load_network as load_onnx
+from pop_core.training.shards import pack, save_shard
+
+torch = pytest.importorskip('torch')
+
+from pop_core.keypoints.depth_net import DepthNetDetector  # noqa: E402 - torch first
+from pop_core.training.export import export_onnx  # noqa: E402
+from pop_core.training.losses import losses  # noqa: E402
+from pop_core.training.network import (  # noqa: E402
+    DepthMaps,
+    NetworkConfig,
+    relief_channels,
+)
+from pop_core.training.run import RunConfig, train, validate  # noqa: E402
+from pop_core.training.scene_pool import ScenePool  # noqa: E402
+from pop_core.training.targets import make_targets  # noqa: E402
+from pop_core.training.trainer import (  # noqa: E402
+    CheckpointError,
+    TrainConfig,
+    Trainer,
+    load_network,
+)
+from pop_core.training.validation import MapScores  # noqa: E402
+
+TINY = NetworkConfig(
+    widths=(4, 8, 8, 12, 12), blocks=(1, 1, 1, 1), pyramid=16, focal_px=80.0)
+SIZE = (96, 64)
+
+
+@pytest.fixture(scope='module')
+def batch(small_scenes):
+    pool = ScenePool(len(small_scenes), torch.device('cpu'))
+    pool.add(pack(small_scenes))
+    drawn = pool.at(range(8))
+    rows, columns = slice(8, 72), slice(8, 104)
+    return type(drawn)(
+        drawn.depth_m[:, rows, columns], drawn.labels[:, rows, columns], drawn.points,
+        drawn.visible, drawn.lens - torch.tensor([0.0, 0.0, 8.0, 8.0]))
+
+
+def trainer(**changes):
+    torch.manual_seed(0)
+    return Trainer(torch.device('cpu'), TINY, TrainConfig(warm_up=1, rate=5e-3, **changes))
+
+
+def true_maps(targets, log_sigma=-3.0):
+    """Return maps that say exactly the targets."""
+    n, h, w = targets.part.shape
+    parts = torch.nn.functional.one_hot(targets.part, 16).permute(0, 3, 1, 2) * 20.0
+    votes, visible = torch.zeros(n, h, w, 45), torch.zeros(n, h, w, 15)
+    votes[targets.person] = targets.votes.reshape(-1, 45)
+    visible[targets.person] = targets.visible * 40.0 - 20.0
+    sigma = torch.full((n, 15, h, w), log_sigma)
+    return DepthMaps(parts, votes.permute(0, 3, 1, 2), sigma, visible.permute(0, 3, 1, 2))
+
+
+def test_the_truth_is_the_least_of_losses(batch):
+    targets = make_targets(batch)
+    best = losses(true_maps(targets), targets)
+    assert float(best['parts']) < 1e-3
+    assert float(best['visible']) < 1e-3
+    assert float(best['dice']) < 1e-2
+    worse = true_maps(targets)._replace(votes=true_maps(targets).votes + 0.02)
+    assert float(losses(worse, targets)['votes']) > float(best['votes'])
+
+
+def test_a_sigma_that_fits_the_error_costs_least(batch):
+    targets = make_targets(batch)
+    cost = {}
+    for sigma in (0.01, 0.05, 0.25):
+        maps = true_maps(targets, float(np.log(sigma)))
+        wrong = maps._replace(votes=maps.votes + 0.05)
+        cost[sigma] = float(losses(wrong, targets)['votes'])
+    assert min(cost, key=cost.get) == 0.05
+
+
+def test_perfect_maps_score_full_marks(batch):
+    targets = make_targets(batch)
+    scores = MapScores()
+    scores.add(true_maps(targets), targets)
+    figures = scores.figures()
+    assert figures['pck_visible'] == figures['pck_hidden'] == 1.0
+    assert figures['person_iou'] == figures['sight'] == 1.0
+
+
+def test_training_lowers_every_loss(batch):
+    learner = trainer()
+    first = learner.step(batch)
+    for _ in range(25):
+        last = learner.step(batch)
+    assert float(last['parts']) < 0.8 * float(first['parts'])
+    assert float(last['votes']) < float(first['votes']) - 0.2
+
+
+def test_a_run_that_went_on_is_a_run_that_never_stopped(batch, tmp_path):
+    whole, parted = trainer(), trainer()
+    for _ in range(4):
+        whole.step(batch)
+    for _ in range(2):
+        parted.step(batch)
+    parted.save(tmp_path / 'checkpoint.pt')
+    resumed = Trainer(torch.device('cpu'), TINY, parted.config)
+    resumed.load(tmp_path / 'checkpoint.pt')
+    for _ in range(2):
+        resumed.step(batch)
+    assert (resumed.steps, resumed.images) == (whole.steps, whole.images)
+    for name, value in whole.averaged.state_dict().items():
+        torch.testing.assert_close(resumed.averaged.state_dict()[name], value)
+
+
+def test_weights_in_half_precision_are_small_and_say_nearly_the_same(batch, tmp_path):
+    learner = trainer()
+    learner.step(batch)
+    learner.save_weights(tmp_path / 'weights.pt')
+    with torch.no_grad():
+        whole = learner.averaged(batch.depth_m[:, None])
+        half = load_network(tmp_path / 'weights.pt')(batch.depth_m[:, None])
+    torch.testing.assert_close(half.parts, whole.parts, atol=0.05, rtol=0.05)
+    full = Trainer(torch.device('cpu'))
+    full.save_weights(tmp_path / 'full.pt')
+    assert (tmp_path / 'full.pt').stat().st_size < 8e6
+
+
+@pytest.mark.parametrize('size', [(64, 96), (160, 192)], ids=str)
+def test_onnx_says_what_torch_says(size, tmp_path, batch):
+    learner = trainer()
+    for _ in range(3):
+        learner.step(batch)
+    network = learner.averaged.eval()
+    export_onnx(network, tmp_path / 'net.onnx', 'a test')
+    depth_m = torch.rand(1, 1, *size) * 4.0 * (torch.rand(1, 1, *size) > 0.1)
+    with torch.no_grad():
+        expected = network(depth_m)
+    session = load_onnx(tmp_path / 'net.onnx')
+    for found, wanted in zip(session.run(depth_m.numpy()), expected, strict=True):
+        np.testing.assert_allclose(found, wanted.numpy(), atol=1e-3)
+    assert session.facts['focal_px'] == '80.0'
+    assert DepthNetDetector(tmp_path / 'net.onnx').focal_px == 80.0
+
+
+def test_relief_is_the_same_near_and_far():
+    steps = torch.zeros(1, 1, 64, 64)
+    steps[..., 32:] = 0.05
+    near, far = relief_channels(steps + 1.5), relief_channels(steps + 3.5)
+    torch.testing.assert_close(near[:, 2:], far[:, 2:], atol=1e-4, rtol=0)
+    assert near[:, 2].abs().max() > 0.2
+
+
+def test_what_was_not_measured_is_zero_in_every_channel(batch):
+    channels = relief_channels(batch.depth_m[:, None])
+    missing = (batch.depth_m == 0)[:, None].expand_as(channels)
+    assert (channels[missing] == 0).all()
+
+
+def test_a_run_writes_checkpoint_history_and_curves(small_scenes, tmp_path):
+    save_shard(pack(small_scenes), tmp_path / 'scenes' / 'a.npz')
+    said = []
+    run = RunConfig(
+        tmp_path / 'run', 0.02, size=SIZE, scenes=tmp_path / 'scenes',
+        validation=tmp_path / 'scenes', cooldown=0.5)
+    for _ in range(2):
+        train(trainer(batch=4), run, said.append)
+    assert any('going on after' in line for line in said)
+    assert {'checkpoint.pt', 'history.json', 'curves.png'} <= {
+        path.name for path in (tmp_path / 'run').iterdir()}
+    assert set(validate(trainer(), run)) == {
+        'pck_visible', 'pck_hidden', 'part_iou', 'person_iou', 'sight'}
+
+
+def test_workers_draw_scenes_meanwhile(tmp_path):
+    said = []
+    run = RunConfig(tmp_path / 'run', 0.01, size=SIZE, workers=1, capacity=1100)
+    train(trainer(batch=2), run, said.append)
+    assert (tmp_path / 'run' / 'checkpoint.pt').exists()
+
+
+def test_a_damaged_checkpoint_is_told(tmp_path):
+    (tmp_path / 'a.pt').write_bytes(b'nothing')
+    with pytest.raises(CheckpointError, match='expected a checkpoint'):
+        load_network(tmp_path / 'a.pt')
+
+
+def test_weights_of_another_size_are_told(tmp_path):
+    trainer().save(tmp_path / 'a.pt')
+    other = Trainer(torch.device('cpu'))
+    with pytest.raises(CheckpointError, match='expected weights of a network'):
+        other.load(tmp_path / 'a.pt')
