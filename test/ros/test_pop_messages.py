@@ -1,20 +1,24 @@
 """The messages of pop_msgs, built by scripts/build_messages.sh, between two processes."""
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support.node import ROOT, RunningNode
+from support.message_packages import environment_with
+from support.node import RunningNode
 from support.recording import Recording, record
 
+from pop_core.body.default_body import default_body
+from pop_core.body.joints import JOINT_NAMES
+from pop_core.body.kinematics import joints
+from pop_core.body.model import BodyParameters
+from pop_core.body.model_digest import model_digest
+from pop_core.estimate import JointState, TrackState
 from pop_ros.bag_reader import BagReader
 from pop_ros.pop_messages import joint_confidence
-
-BUILD = Path(os.environ.get('POP_MSGS_BUILD', ROOT / 'build' / 'pop_msgs'))
 
 # Prints what arrives on the latched ~/body_model and the first ~/bodies.
 LISTENER = '''
@@ -38,21 +42,12 @@ print(json.dumps({
     'parameters': {n: getattr(body.parameters, n).tolist() for n in
                    ('transl', 'global_orient', 'body_pose')},
     'betas': list(body.parameters.betas), 'scale': body.parameters.scale,
+    'digest': model.digest, 'visible': body.visible_fraction, 'track': body.track_state,
+    'energies': dict(zip(body.energy_names, body.energies)), 'id': body.id,
+    'covariance': [j.covariance.tolist() for j in body.joints],
     'states': [j.state for j in body.joints], 'confidence': [j.confidence for j in body.joints],
 }))
 '''
-
-
-@pytest.fixture(scope='module')
-def messages_path() -> dict[str, str]:
-    """Return the environment in which pop_msgs is importable."""
-    setup = BUILD / 'setup.sh'
-    if not setup.is_file():
-        pytest.skip(f'looked for {setup}: scripts/build_messages.sh builds pop_msgs '
-                    '(needs g++ and python3-dev)')
-    lines = subprocess.run(
-        ['sh', '-c', f'. {setup}; env'], capture_output=True, text=True, check=True).stdout
-    return dict(line.split('=', 1) for line in lines.splitlines() if '=' in line)
 
 
 @pytest.fixture(scope='module')
@@ -61,15 +56,10 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 
 def test_a_receiver_rebuilds_joints_from_the_published_parameters(
-    messages_path: dict[str, str], recording: Recording, tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch
+    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from pop_core.body.default_body import default_body
-    from pop_core.body.joints import JOINT_NAMES
-    from pop_core.body.kinematics import joints
-    from pop_core.body.model import BodyParameters
-    for name in ('PYTHONPATH', 'LD_LIBRARY_PATH', 'AMENT_PREFIX_PATH'):
-        monkeypatch.setenv(name, messages_path.get(name, ''))
+    for name, value in environment_with('pop_msgs').items():
+        monkeypatch.setenv(name, value)
     bag = recording.write(tmp_path / 'in.mcap', '16UC1')
     node = RunningNode('--keypoints', 'json', '--keypoints-dir', str(recording.keypoints))
     listener = subprocess.Popen(
@@ -79,10 +69,7 @@ def test_a_receiver_rebuilds_joints_from_the_published_parameters(
         out = tmp_path / 'out'
         play = [sys.executable, '-m', 'pop_ros.cli', 'replay', str(bag), '--out', str(out),
                 '--node-running']
-        environment = {**os.environ,
-                       'PYTHONPATH': f'{ROOT}{os.pathsep}{os.environ["PYTHONPATH"]}'}
-        done = subprocess.run(
-            play, env=environment, capture_output=True, text=True, timeout=120, check=False)
+        done = subprocess.run(play, capture_output=True, text=True, timeout=120, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
         told, _ = listener.communicate(timeout=30)
     finally:
@@ -102,6 +89,16 @@ def test_a_receiver_rebuilds_joints_from_the_published_parameters(
     np.testing.assert_allclose(joints(model, parameters)[4], found['joint'], atol=1e-5)
     assert set(found['states']) <= {0, 1, 2, 3, 4}
     assert all(0 < value <= 1 for value in found['confidence'])
+    assert found['digest'] == model_digest(model)
+    # float32 on the way, and again in the mean.
+    np.testing.assert_allclose(
+        found['visible'], np.mean(np.equal(found['states'], JointState.VISIBLE)), rtol=1e-6)
+    covariance = np.reshape(found['covariance'], (24, 3, 3))
+    np.testing.assert_allclose(found['confidence'], joint_confidence(covariance), rtol=1e-5)
+    assert np.all(np.linalg.eigvalsh(covariance) > 0)
+    assert found['track'] in {*TrackState, 255}
+    assert found['energies']
+    assert all(np.isfinite(list(found['energies'].values())))
     with BagReader(tmp_path / 'out') as written:
         assert {t.name: t.count for t in written.topics}['/pop/bodies'] == 1
 

@@ -1,18 +1,17 @@
 """TF frames of people, with the one message of tf2_msgs built from test/support/tf2_msgs."""
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from support.message_packages import environment_with
 from support.messages import FRAME_ID
-from support.node import ROOT, RunningNode
+from support.node import RunningNode
 from support.recording import record
 
-BUILD = Path(os.environ.get('POP_TF2_BUILD', ROOT / 'build' / 'tf2_msgs'))
 LISTENER = '''
 import json, rclpy
 from tf2_msgs.msg import TFMessage
@@ -32,15 +31,8 @@ print(json.dumps([{
 
 @pytest.fixture
 def tf2_environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    setup = BUILD / 'setup.sh'
-    if not setup.is_file():
-        pytest.skip(f'looked for {setup}: scripts/build_messages.sh build/tf2_msgs python3 '
-                    'test/support/tf2_msgs builds it')
-    lines = subprocess.run(
-        ['sh', '-c', f'. {setup}; env'], capture_output=True, text=True, check=True).stdout
-    given = dict(line.split('=', 1) for line in lines.splitlines() if '=' in line)
-    for name in ('PYTHONPATH', 'LD_LIBRARY_PATH', 'AMENT_PREFIX_PATH'):
-        monkeypatch.setenv(name, given.get(name, ''))
+    for name, value in environment_with('tf2_msgs').items():
+        monkeypatch.setenv(name, value)
 
 
 @pytest.mark.usefixtures('tf2_environment')
@@ -51,12 +43,11 @@ def test_frames_of_a_person_stand_where_the_person_stands(tmp_path: Path) -> Non
                        '--ros-args', '-p', 'tf.frames:=joints')
     listener = subprocess.Popen(
         [sys.executable, '-c', LISTENER], stdout=subprocess.PIPE, text=True)
-    path = os.pathsep.join([str(ROOT), os.environ['PYTHONPATH']])
     try:
         node.wait_for('ready after')
         done = subprocess.run(
             [sys.executable, '-m', 'pop_ros.cli', 'replay', str(bag), '--out',
-             str(tmp_path / 'out'), '--node-running'], env={**os.environ, 'PYTHONPATH': path},
+             str(tmp_path / 'out'), '--node-running'],
             capture_output=True, text=True, timeout=120, check=False)
         assert done.returncode == 0, done.stdout + done.stderr
         told, _ = listener.communicate(timeout=30)
