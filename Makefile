@@ -6,7 +6,9 @@
 #   make bench-gate   accuracy and speed on a few scenes against the committed baseline
 #   make messages     the ROS messages of msg_defs, and those of other packages that tests need,
 #                     without ROS (needs g++ and python3-dev)
+#   make viz          add the rerun SDK (200 MB), for `--rerun` and its test
 #   make docs         write the generated pages of docs/ anew
+#   make pictures     draw the pictures of docs/ anew (that of rviz needs ROS 1)
 #
 # Needs Python 3.10 to 3.13 with venv, and make. Choose another Python with PYTHON=, another place
 # for the environment with VENV=. What is downloaded goes into that environment only.
@@ -19,7 +21,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 TEST_MESSAGES := tf2_msgs hri_msgs zed_msgs vision_msgs yolo_msgs
 SOURCES := $(shell find pop_core pop_ros -type f -not -name '*.pyc') setup.py package.xml
 
-.PHONY: demo test check bench-gate messages docs pictures clean
+.PHONY: demo test check bench-gate messages viz docs pictures clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.installed
@@ -40,6 +42,9 @@ messages: $(BIN)/python
 	set -e; for package in $(TEST_MESSAGES); do \
 	  POP_MESSAGE_TOOLS=$(abspath build/pop_msgs/tools) \
 	    scripts/build_messages.sh build/$$package $(BIN)/python test/support/$$package; done
+
+viz: $(VENV)/.tools
+	$(PIP) install --quiet --constraint constraints.txt 'rerun-sdk>=0.23'
 
 docs: $(VENV)/.tools
 	$(BIN)/python -m scripts.write_docs

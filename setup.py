@@ -36,7 +36,9 @@ setup(
     ],
     zip_safe=False,
     install_requires=[
+        "backports.zstd; python_version < '3.14'",
         'jaxtyping',
+        'lz4>=4',
         'numba>=0.60',
         'numpy>=1.26',
         'onnxruntime>=1.17',
@@ -51,7 +53,7 @@ setup(
         f'ros-jazzy-rmw-fastrtps-cpp; {ROS_WHEELS}',
     ],
     extras_require={
-        'test': ['beartype', 'mypy', 'onnx', 'pytest', 'ruff'],
+        'test': ['beartype', 'mcap-ros2-support', 'mypy', 'onnx', 'pytest', 'ruff'],
         'train': ['onnx', 'torch==2.13.0'],
         'viz': ['rerun-sdk>=0.23'],
         'ray': ['ray'],

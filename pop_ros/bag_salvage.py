@@ -10,6 +10,7 @@ from __future__ import annotations
 import bz2
 import sqlite3
 import struct
+import sys
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
@@ -19,6 +20,11 @@ from typing import BinaryIO
 from urllib.parse import quote
 
 import lz4.frame  # type: ignore[import-untyped]
+
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
 
 MCAP_MAGIC = b'\x89MCAP0\r\n'
 ROS1_MAGIC = b'#ROSBAG V2.0\n'
@@ -87,7 +93,7 @@ def _walk_ros1(
                 sec, nanosec = struct.unpack('<II', fields[b'time'])
                 topic, kind = topics[number]
                 yield SalvagedMessage(topic, kind, sec * 1_000_000_000 + nanosec, data)
-    except (_CutOffError, KeyError, ValueError, RuntimeError, OSError):
+    except (_CutOffError, KeyError, ValueError, RuntimeError, OSError, zstd.ZstdError):
         return  # whatever follows the damage cannot be trusted
 
 
@@ -117,7 +123,7 @@ def _walk_mcap(
             elif op == MCAP_MESSAGE:
                 number, _, time_ns, _ = struct.unpack('<HIQQ', _exactly(record, 22))
                 yield SalvagedMessage(*topics[number], time_ns, record.read())
-    except (_CutOffError, KeyError, ValueError, RuntimeError, OSError):
+    except (_CutOffError, KeyError, ValueError, RuntimeError, OSError, zstd.ZstdError):
         return  # whatever follows the damage cannot be trusted
 
 
@@ -165,4 +171,6 @@ def _decompress(compression: str, data: bytes) -> bytes:
         return bz2.decompress(data)
     if compression == 'lz4':
         return bytes(lz4.frame.decompress(data))
+    if compression == 'zstd':
+        return zstd.decompress(data)
     raise ValueError(compression)

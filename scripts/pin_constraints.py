@@ -2,7 +2,7 @@
 
 For each Python, resolve the requirements without installing them, then merge the reports:
 
-    python3.X -m pip install --dry-run --ignore-installed --report 3.X.json '.[test]'
+    python3.X -m pip install --dry-run --ignore-installed --report 3.X.json '.[test,viz]'
     python scripts/pin_constraints.py 3.10.json 3.11.json 3.12.json 3.13.json > constraints.txt
 """
 
