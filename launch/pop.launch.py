@@ -20,7 +20,7 @@ ARGUMENTS = {
     'color': ('', 'colour topic, if not that of the driver'),
     'depth': ('', 'registered depth topic, if not that of the driver'),
     'info': ('', 'CameraInfo topic of colour, if not that of the driver'),
-    'keypoints': ('depth', 'json, depth or the path of an ONNX network'),
+    'keypoints': ('depth', 'json, depth, an ONNX network or a name of pop models list; commas'),
     'keypoints_dir': ('', 'folder of <stamp_ns>.json files, for keypoints:=json'),
     'decoder': ('', 'decoder of a network whose outputs do not tell'),
     'params_file': (str(SHARE / 'config' / 'pop.yaml'), 'file of parameters'),

@@ -20,6 +20,7 @@ from pop_core.errors import PopError
 from pop_ros.frame_work import FrameWork
 from pop_ros.health import NodeHealth
 from pop_ros.inputs import RgbdInputs, RgbdMessages
+from pop_ros.keypoint_sources import reasons
 from pop_ros.node_arguments import SourceArguments
 from pop_ros.node_config import NodeConfig
 from pop_ros.node_outputs import NodeOutputs
@@ -115,7 +116,7 @@ class PopNode(LifecycleNode):
             self.log.error(f'not configured: {error}')
             return TransitionCallbackReturn.FAILURE
         self.refusal = None
-        for text in self._outputs.missing:
+        for text in (*reasons(detector), *self._outputs.missing):
             self.log.info(text)
         self._work = FrameWork(
             self, self._settings, detector, self._frames, self._outputs, self._statistics)

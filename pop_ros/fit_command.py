@@ -26,10 +26,10 @@ def fit(
         help='Folder with color.png, depth.png (16 bit, mm) and camera.json (here or in its '
              'parent folder), or a folder of such folders.')],
     out: Annotated[Path, typer.Option('--out', help='Folder for the results.')],
-    keypoints: Annotated[str | None, typer.Option(
+    keypoints: Annotated[list[str] | None, typer.Option(
         '--keypoints', metavar='SOURCE',
-        help='json (keypoints.json of each frame) or the path of an ONNX network. '
-             'Without it, keypoints.json.')] = None,
+        help='json (keypoints.json of each frame), the path of an ONNX network, or a name of '
+             '"pop models list"; several are merged. Without it, keypoints.json.')] = None,
     decoder: Annotated[str | None, typer.Option(
         '--decoder', metavar='NAME',
         help='How to read a network whose outputs do not tell.')] = None,
@@ -55,6 +55,10 @@ def fit(
 
       pop fit five_people --out results --keypoints posenet.onnx
 
+    Two networks merged, the second one looks where the first one finds people:
+
+      pop fit five_people --out results --keypoints rtmo-m --keypoints rtmpose-m
+
     All frames below a folder, each with its own keypoints.json, two people at most:
 
       pop fit recordings/ --out results --set max_people=2
@@ -67,7 +71,9 @@ def fit(
     from pop_ros.sources import make_pipeline
 
     config = with_flags(PipelineConfig(), settings or [])
-    source = FrameKeypoints(keypoints, decoder, config.people)
+    source = FrameKeypoints(','.join(keypoints or []) or None, decoder, config.people)
+    for reason in source.reasons:
+        typer.echo(reason, err=True)
     frames, bad = _collect(inputs)
     if frames:
         with first_use_progress() as progress:

@@ -1,10 +1,10 @@
-"""Keypoints for `pop fit`: each frame's own file, or one network for all frames."""
+"""Keypoints for `pop fit`: each frame's own file, networks for all frames, or both merged."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pop_ros.keypoint_sources import SOURCES, SourceError, keep_people, make_detector
+from pop_ros.keypoint_sources import SOURCES, SourceError, keep_people, make_detector, reasons
 
 if TYPE_CHECKING:
     from pop_core.keypoints.detection import Detection, KeypointDetector
@@ -24,32 +24,44 @@ class FrameKeypoints:
         Raises:
             PopError: If a named source does not exist or fits no decoder.
         """
-        self._network: KeypointDetector | None = None
-        if source not in (None, 'json'):
-            self._network = make_detector(str(source), decoder=decoder)
+        self._file = _FolderFile()
+        self._source: KeypointDetector = self._file
+        if source is not None:
+            self._source = make_detector(source, decoder=decoder, json_source=self._file)
             if people is not None:
-                keep_people(self._network, people)
-        self._current: KeypointDetector | None = None
+                keep_people(self._source, people)
+
+    @property
+    def reasons(self) -> list[str]:
+        """Return a sentence about each network: how it is read, and why so."""
+        return reasons(self._source)
 
     def choose(self, folder: FrameFolder) -> None:
-        """Prepare for the frame of a folder.
+        """Prepare for the frame of a folder."""
+        self._file.folder = folder
+
+    def detect(self, frame: RgbdFrame) -> list[Detection]:
+        """Return the people of the chosen folder's frame.
 
         Raises:
             SourceError: If keypoints are to come from the folder and it has none.
-            KeypointFileError: If its file is damaged.
+            PopError: If a source cannot read what it needs.
         """
-        from pop_core.keypoints.openpose_json import FileDetector
+        return self._source.detect(frame)
 
-        if self._network is not None:
-            self._current = self._network
-        elif folder.keypoints.is_file():
-            self._current = FileDetector(folder.keypoints)
-        else:
-            raise SourceError(
-                f'{folder.path}: expected keypoints.json, or --keypoints with {SOURCES}, '
-                'found neither')
+
+class _FolderFile:
+    """People of the file that lies beside a frame."""
+
+    def __init__(self) -> None:
+        self.folder: FrameFolder | None = None
 
     def detect(self, frame: RgbdFrame) -> list[Detection]:
-        """Return the people of the chosen folder's frame."""
-        assert self._current is not None
-        return self._current.detect(frame)
+        from pop_core.keypoints.openpose_json import FileDetector
+
+        assert self.folder is not None
+        if not self.folder.keypoints.is_file():
+            raise SourceError(
+                f'{self.folder.path}: expected keypoints.json, or --keypoints with {SOURCES}, '
+                'found neither')
+        return FileDetector(self.folder.keypoints).detect(frame)

@@ -25,7 +25,8 @@ class SourceArguments:
     """Where the node takes keypoints from.
 
     Args:
-        keypoints: 'json', 'depth' or the path of an ONNX network.
+        keypoints: 'json', 'depth', the path of an ONNX network or a name of the registry;
+            several, with commas between, are merged.
         keypoints_dir: Folder of `<stamp_ns>.json` files for 'json'.
         decoder: Decoder of an ONNX network whose outputs do not tell, or None.
     """
@@ -83,9 +84,10 @@ def parse_arguments(arguments: Sequence[str]) -> NodeArguments:
         prog='pop node', epilog=EPILOG,
         description='Fit people to RGB-D images: mesh, joints and points of every person.')
     parser.add_argument(
-        '--keypoints', default='depth', metavar='SOURCE',
-        help='json (OpenPose files) or the path of an ONNX network; depth, the embedded network, '
-             'is not in this version')
+        '--keypoints', action='append', metavar='SOURCE',
+        help='json (OpenPose files), the path of an ONNX network, or a name of "pop models list"; '
+             'several, given again or with commas between, are merged; depth, the embedded '
+             'network, is not in this version')
     parser.add_argument(
         '--keypoints-dir', type=Path, metavar='DIR',
         help='folder of OpenPose files named <stamp_ns>.json, for --keypoints json')
@@ -95,5 +97,6 @@ def parse_arguments(arguments: Sequence[str]) -> NodeArguments:
         '--camera', choices=sorted(CAMERA_PRESETS),
         help='read the topics of this driver; remappings given beside it win')
     found = parser.parse_args(arguments)
-    sources = SourceArguments(found.keypoints, found.keypoints_dir, found.decoder)
+    keypoints = ','.join(found.keypoints or ['depth'])
+    sources = SourceArguments(keypoints, found.keypoints_dir, found.decoder)
     return NodeArguments(sources, found.camera)

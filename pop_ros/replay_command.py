@@ -32,9 +32,11 @@ def replay(
     inputs: Annotated[bool, typer.Option(
         '--inputs', help="Copy the camera's messages and the transforms into the results.",
     )] = False,
-    keypoints: Annotated[str, typer.Option(
-        '--keypoints', help='json (OpenPose files) or the path of an ONNX network; depth, the '
-                            'embedded network, is not in this version.')] = 'depth',
+    keypoints: Annotated[list[str], typer.Option(
+        '--keypoints', metavar='SOURCE',
+        help='json (OpenPose files), the path of an ONNX network, or a name of "pop models '
+             'list"; several are merged. depth, the embedded network, is not in this version.',
+    )] = ['depth'],  # noqa: B006 - typer reads it, nobody writes it
     keypoints_dir: Annotated[Path | None, typer.Option(
         '--keypoints-dir', help='Folder of <stamp_ns>.json files.')] = None,
     decoder: Annotated[str | None, typer.Option(
@@ -96,7 +98,7 @@ def replay(
     use_large_shared_memory()
     request = ReplayRequest(
         bags=tuple(bags), out=out, ros1=ros1,
-        sources=SourceArguments(keypoints, keypoints_dir, decoder),
+        sources=SourceArguments(','.join(keypoints), keypoints_dir, decoder),
         topics=(color, depth, info), slop_s=slop, every_frame=every_frame,
         node_running=node_running, pace=Pace(rate, loop, step, clock),
         part=BagPart(start, duration), storage=storage.value, inputs=inputs)

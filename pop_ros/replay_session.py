@@ -16,6 +16,7 @@ from pop_ros.bag_merge import BagPart, MergedBags
 from pop_ros.bag_topics import RgbdTopics, find_topics
 from pop_ros.bag_writer import BagWriter
 from pop_ros.frame_fitter import FrameFitter
+from pop_ros.keypoint_sources import make_detector, reasons
 from pop_ros.node_arguments import SourceArguments
 from pop_ros.node_config import NodeConfig
 from pop_ros.recording import Recording
@@ -24,7 +25,6 @@ from pop_ros.replay_dds import READY_S, DdsPlayer, bag_transports
 from pop_ros.replay_inputs import CopiedInputs
 from pop_ros.replay_node import NodeProcess
 from pop_ros.replay_pace import Pace
-from pop_ros.sources import make_detector
 
 RUNNING_NODE_S = 30.0
 STEP_KEYS = 'Enter shows the next frame, Ctrl-D plays on to the end, Ctrl-C ends'
@@ -85,7 +85,7 @@ def run_replay(request: ReplayRequest, say: Callable[[str], None]) -> ReplaySumm
                 bar.update(task, description='messages', advance=1)
 
             if request.every_frame:
-                return _every_frame(request, bag, topics, on_message)
+                return _every_frame(request, bag, topics, on_message, say)
             return _over_dds(request, bag, topics, on_message, say)
 
 
@@ -99,10 +99,14 @@ def _message_count(
 
 
 def _every_frame(
-    request: ReplayRequest, bag: Recording, topics: RgbdTopics, on_message: Callable[[], None]
+    request: ReplayRequest, bag: Recording, topics: RgbdTopics, on_message: Callable[[], None],
+    say: Callable[[str], None],
 ) -> ReplaySummary:
     writer = BagWriter(request.out, request.ros1, request.storage)
-    fitter = FrameFitter(request.sources.detector(), PipelineConfig(), NodeConfig())
+    detector = request.sources.detector()
+    for reason in reasons(detector):
+        say(reason)
+    fitter = FrameFitter(detector, PipelineConfig(), NodeConfig())
     with writer:
         return replay_every_frame(
             _read(request, bag, topics, writer), topics, fitter, writer, slop_s=request.slop_s,
