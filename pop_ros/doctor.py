@@ -18,6 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 
 from pop_ros.camera_presets import CAMERA_PRESETS
+from pop_ros.interop import HRI_MISFIT, INTEROP, MISFITS
 from pop_ros.pop_messages import pop_msgs
 from pop_ros.qos import describe_qos
 from pop_ros.tf_messages import tf2_msgs
@@ -107,6 +108,20 @@ def message_packages() -> Iterator[Finding]:
             yield Finding(name, Verdict.NOTE, 'not installed', f'it would add {gain}')
         else:
             yield Finding(name, Verdict.GOOD, 'installed')
+    yield packages_of_others()
+
+
+def packages_of_others() -> Finding:
+    """Return which packages are installed whose messages people are published in, too."""
+    misfits = {interop.package: MISFITS[name] for name, interop in INTEROP.items()}
+    misfits['hri_msgs'] = HRI_MISFIT
+    fitting = [name for name, trouble in misfits.items() if not trouble]
+    troubles = [trouble for trouble in misfits.values() if trouble and 'version' in trouble]
+    if troubles:
+        return Finding('other messages', Verdict.NOTE, '; '.join(troubles),
+                       'their outputs are left away: docs/interoperability.md')
+    return Finding('other messages', Verdict.GOOD, (
+        f'{", ".join(fitting)} installed' if fitting else f'none of {", ".join(misfits)} is needed'))
 
 
 def caches() -> Finding:

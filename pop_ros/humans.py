@@ -20,9 +20,9 @@ from std_msgs.msg import Header
 from pop_core.geometry.rotation import to_quat_xyzw
 from pop_core.rgbd import RgbdFrame
 from pop_ros import interop_hri
-from pop_ros.interop import message_module
 from pop_ros.interop_hri_joints import link_frames
 from pop_ros.interop_person import Person
+from pop_ros.message_packages import message_module
 from pop_ros.qos import output_qos
 from pop_ros.tf_messages import tf2_msgs
 

@@ -6,7 +6,6 @@ a person of no importance, and its output is left away with a reason.
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,6 +19,7 @@ from pop_core.estimate import BodyEstimate
 from pop_core.geometry.camera import Camera
 from pop_ros import interop_hri, interop_vision, interop_yolo, interop_zed
 from pop_ros.interop_person import POINT_NAMES, Person
+from pop_ros.message_packages import message_module
 
 Convert = Callable[[Sequence[Person], Header, Any], Any]
 
@@ -45,14 +45,6 @@ INTEROP = {
     'yolo_detections': Interop('yolo_msgs', 'DetectionArray', interop_yolo.detections_message),
     'zed_objects': Interop('zed_msgs', 'ObjectsStamped', interop_zed.objects_message),
 }
-
-
-def message_module(package: str) -> Any:
-    """Return the module of a package's messages, or None if it is not installed."""
-    try:
-        return importlib.import_module(f'{package}.msg')
-    except ImportError:
-        return None
 
 
 def misfit(package: str, try_out: Callable[[Any], object]) -> str:

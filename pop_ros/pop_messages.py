@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,18 +14,10 @@ from pop_core.body.joints import JOINT_NAMES
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.body.model_digest import model_digest
 from pop_core.estimate import BodyEstimate, JointState
+from pop_ros.message_packages import message_module
 from pop_ros.to_messages import body_poses
 
-
-def _installed() -> Any:
-    """Return the module of the messages; an ament_python package cannot bring its own."""
-    try:
-        return importlib.import_module('pop_msgs.msg')
-    except ImportError:
-        return None
-
-
-pop_msgs = _installed()
+pop_msgs = message_module('pop_msgs')
 HALF_CONFIDENCE_M = 0.1  # standard deviation at which a joint's confidence is one half
 
 

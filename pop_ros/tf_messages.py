@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,17 +11,9 @@ from std_msgs.msg import Header
 from pop_core.body.joints import JOINT_NAMES
 from pop_core.estimate import BodyEstimate
 from pop_core.geometry.rotation import to_quat_xyzw
+from pop_ros.message_packages import message_module
 
-
-def _installed() -> Any:
-    """Return the module of the messages; ROS 2 from pip lacks it."""
-    try:
-        return importlib.import_module('tf2_msgs.msg')
-    except ImportError:
-        return None
-
-
-tf2_msgs = _installed()
+tf2_msgs = message_module('tf2_msgs')  # ROS 2 from pip lacks it
 
 
 def transforms_message(

@@ -9,8 +9,9 @@ from support.plain_messages import received
 from pop_core.body.default_body import default_body
 from pop_core.rgbd import RgbdFrame
 from pop_ros import interop_hri
-from pop_ros.interop import HRI_MISFIT, INTEROP_TYPES, MISFITS, interop_message, message_module
+from pop_ros.interop import HRI_MISFIT, INTEROP_TYPES, MISFITS, interop_message
 from pop_ros.interop_person import PersonReader
+from pop_ros.message_packages import message_module
 from pop_ros.to_messages import make_header
 
 STAMP_NS = 1_700_000_000_987_654_321
