@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_whole_image_decoders import as_float, box_around, planes_spec, row, spot_in, spotted
+from spot_networks import as_float, box_around, planes_spec, row, spot_in, spotted
 
 from pop_core.errors import NetworkShapeError
 from pop_core.keypoints.decoders import choose_decoder

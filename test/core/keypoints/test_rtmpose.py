@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from test_whole_image_decoders import spot_in, spotted
+from spot_networks import spot_in, spotted
 
 from pop_core.body.joints import SHARED_INDEX
 from pop_core.keypoints.box_crop import crop_box
