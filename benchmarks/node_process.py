@@ -1,0 +1,54 @@
+"""The node as a process that is watched: memory, processor time, and how it ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+TICKS = os.sysconf('SC_CLK_TCK')
+PAGE = os.sysconf('SC_PAGE_SIZE')
+STOP_S = 30.0
+
+
+class WatchedNode:
+    """A node with keypoints from a folder; Linux tells what it uses."""
+
+    def __init__(self, keypoints: Path, *ros_arguments: str) -> None:
+        """Start it."""
+        command = [sys.executable, '-m', 'pop_ros.node', '--keypoints', 'json',
+                   '--keypoints-dir', str(keypoints), '--ros-args', *ros_arguments]
+        self.started_s = time.monotonic()
+        self._process = subprocess.Popen(command)
+        self._files = Path('/proc') / str(self._process.pid)
+
+    def check(self) -> None:
+        """Raise if it has ended."""
+        if self._process.poll() is not None:
+            raise RuntimeError(f'the node ended with {self._process.returncode}')
+
+    @property
+    def memory_mb(self) -> float:
+        """Return the resident memory [MB]."""
+        return int((self._files / 'statm').read_text().split()[1]) * PAGE / 1e6
+
+    @property
+    def cpu_s(self) -> float:
+        """Return the processor time used so far [s]."""
+        fields = (self._files / 'stat').read_text().rsplit(')', 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / TICKS
+
+    def stop(self) -> tuple[int, float]:
+        """End it as Ctrl-C does; return its exit code and how long that took [s]."""
+        started_s = time.monotonic()
+        if self._process.poll() is None:
+            self._process.send_signal(signal.SIGINT)
+        try:
+            code = self._process.wait(STOP_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            code = self._process.wait()
+        return code, time.monotonic() - started_s
