@@ -120,8 +120,9 @@ def packages_of_others() -> Finding:
     if troubles:
         return Finding('other messages', Verdict.NOTE, '; '.join(troubles),
                        'their outputs are left away: docs/interoperability.md')
-    return Finding('other messages', Verdict.GOOD, (
-        f'{", ".join(fitting)} installed' if fitting else f'none of {", ".join(misfits)} is needed'))
+    none = f'none of {", ".join(misfits)} is needed'
+    text = f'{", ".join(fitting)} installed' if fitting else none
+    return Finding('other messages', Verdict.GOOD, text)
 
 
 def caches() -> Finding:
