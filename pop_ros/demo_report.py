@@ -11,8 +11,8 @@ from pop_core import __version__
 from pop_core.body.default_body import default_body
 from pop_ros.demo import DemoFrame, DemoPaths
 from pop_ros.replay import ReplaySummary
-from pop_ros.report import Report
-from pop_ros.show_recording import HOW_TO_TURN, LEGEND, MAX_SCENES
+from pop_ros.report import Picture, Report
+from pop_ros.show_recording import HOW_TO_TURN, LEGEND, MAX_SCENES, PAGE_PX
 
 LEAD = (
     'A synthetic person walks behind a table. A ROS 2 node in its own process received the '
@@ -25,7 +25,7 @@ def write_demo_report(
 ) -> None:
     """Write the report of a demo."""
     report = Report('pop: a body, hidden limbs included', LEAD)
-    report.film([frame.picture for frame in frames], [_caption(frame) for frame in frames])
+    report.film([Picture.encoded(f.picture, _caption(f), PAGE_PX) for f in frames])
     report.text(LEGEND)
     scenes = [frame.scene for frame in frames if frame.scene is not None]
     if scenes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -50,16 +50,28 @@ def read_bodies(bag: Path) -> dict[int, RecordedFrame]:
     Raises:
         BagError: If there is no such bag.
     """
-    frames: dict[int, RecordedFrame] = defaultdict(RecordedFrame)
+    return dict(iterate_bodies(bag))
+
+
+def iterate_bodies(bag: Path) -> Iterator[tuple[int, RecordedFrame]]:
+    """Yield the recorded people of a bag, frame by frame with their stamps [ns].
+
+    Raises:
+        BagError: If there is no such bag.
+    """
+    frame, current_ns = RecordedFrame(), None
     with BagReader(bag) as reader:
         for message in reader.messages([MESH, JOINTS, CLOUD]):
-            if message.topic == MESH:
-                marker, corners = read_marker(message.data)
-                _add_mesh(frames[stamp_ns(marker.header)], marker, corners)
-            else:
-                content = message.read()
-                _add(frames[stamp_ns(content.header)], message.topic, content)
-    return dict(frames)
+            content, corners = (
+                read_marker(message.data) if message.topic == MESH else (message.read(), None))
+            stamp = stamp_ns(content.header)
+            if current_ns is not None and stamp != current_ns:
+                yield current_ns, frame
+                frame = RecordedFrame()
+            current_ns = stamp
+            _add(frame, message.topic, content, corners)
+    if current_ns is not None:
+        yield current_ns, frame
 
 
 def shown_bodies(
@@ -102,15 +114,14 @@ def cloud_mask(points: np.ndarray, camera: Camera) -> Bool[np.ndarray, 'h w']:
     return mask
 
 
-def _add(frame: RecordedFrame, topic: str, content: Any) -> None:
+def _add(
+    frame: RecordedFrame, topic: str, content: Any, corners: Float[np.ndarray, 'n 3'] | None
+) -> None:
     if topic == CLOUD:
         frame.cloud = np.frombuffer(bytes(content.data), CLOUD_TYPE)
-    else:
+    elif topic == JOINTS:
         places = [(p.position.x, p.position.y, p.position.z) for p in content.poses]
         frame.joints = np.array(places, dtype=np.float64).reshape(-1, N_JOINTS, 3)
-
-
-def _add_mesh(frame: RecordedFrame, marker: Any, corners: Float[np.ndarray, 'n 3']) -> None:
-    if marker.action == ADD:
+    elif content.action == ADD and corners is not None:
         frame.triangles.append(corners)
-        frame.ids.append(int(marker.id))
+        frame.ids.append(int(content.id))

@@ -67,6 +67,8 @@ def replay(
     pictures: Annotated[Path | None, typer.Option(
         '--pictures', help='Folder for a page with 3D views, and a film, as pop show draws them.',
     )] = None,
+    overlays: Annotated[bool, typer.Option(
+        '--overlays', help='Also write the picture of every frame there.')] = False,
     rerun: Annotated[Path | None, typer.Option(
         '--rerun', metavar='FILE.rrd', help='Recording for the rerun viewer (extra viz).')] = None,
 ) -> None:
@@ -95,6 +97,8 @@ def replay(
     if every_frame and (loop or step or clock or node_running):
         raise typer.BadParameter(
             '--loop, --step, --clock and --node-running play to a node: leave --every-frame away')
+    if overlays and pictures is None:
+        raise typer.BadParameter('--overlays needs a folder: name it with --pictures')
     use_large_shared_memory()
     request = ReplayRequest(
         bags=tuple(bags), out=out, ros1=ros1,
@@ -112,4 +116,4 @@ def replay(
     if pictures is not None or rerun is not None:
         from pop_ros.show_command import draw_replay
 
-        draw_replay(request, pictures, rerun, summary.text().splitlines())
+        draw_replay(request, pictures, rerun, summary.text().splitlines(), overlays=overlays)

@@ -6,10 +6,12 @@ import base64
 import html
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
+from jaxtyping import UInt8
 
 from pop_ros.report3d import SceneFrame, scene_html, scene_scripts
 
@@ -47,6 +49,35 @@ for (const film of document.querySelectorAll('.film')) {
 """
 
 
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """One picture of a page.
+
+    Args:
+        jpeg: The picture as JPEG in base 64.
+        caption: A sentence about it.
+    """
+
+    jpeg: str
+    caption: str
+
+    @classmethod
+    def encoded(cls, rgb: UInt8[np.ndarray, 'h w 3'], caption: str, width: int) -> Picture:
+        """Return a picture of at most some width [px].
+
+        Raises:
+            OSError: If it cannot be encoded.
+        """
+        if rgb.shape[1] > width:
+            size = (width, max(1, round(rgb.shape[0] * width / rgb.shape[1])))
+            rgb = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)
+        done, content = cv2.imencode(
+            '.jpg', cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+        if not done:
+            raise OSError('the picture could not be encoded')
+        return cls(base64.b64encode(content.tobytes()).decode('ascii'), caption)
+
+
 class Report:
     """A page that is written from top to bottom."""
 
@@ -75,24 +106,15 @@ class Report:
         body = ''.join(f'<tr>{row}</tr>' for row in cells)
         self._parts.append(f'<table><tr>{top}</tr>{body}</table>')
 
-    def picture(self, rgb: np.ndarray, caption: str) -> None:
-        """Add a picture."""
-        self._parts.append(
-            f'<figure><img alt="{html.escape(caption)}" '
-            f'src="data:image/jpeg;base64,{_jpeg(rgb)}">'
-            f'<figcaption>{html.escape(caption)}</figcaption></figure>')
-
-    def film(self, pictures: Sequence[np.ndarray], captions: Sequence[str]) -> None:
+    def film(self, pictures: Sequence[Picture]) -> None:
         """Add pictures of which a slider shows one."""
-        frames = [
-            {'jpeg': _jpeg(rgb), 'caption': caption}
-            for rgb, caption in zip(pictures, captions, strict=True)]
+        frames = [{'jpeg': p.jpeg, 'caption': p.caption} for p in pictures]
         # A closing tag inside the data would end the script.
         data = json.dumps(frames).replace('</', '<\\/')
         self._parts.append(
             '<figure class="film"><img alt="">'
             f'<input type="range" min="0" max="{len(frames) - 1}" value="{len(frames) // 2}" '
-            'aria-label="frame"><figcaption></figcaption>'
+            f'aria-label="frame"{" hidden" if len(frames) == 1 else ""}><figcaption></figcaption>'
             f'<script type="application/json">{data}</script></figure>')
 
     def scenes(self, scenes: Sequence[SceneFrame], f: np.ndarray) -> None:
@@ -114,11 +136,3 @@ class Report:
             f'<meta name="viewport" content="width=device-width">'
             f'<title>{html.escape(self._title)}</title><style>{STYLE}</style>'
             f'<body>{body}{self._scripts}</body></html>\n', encoding='utf-8')
-
-
-def _jpeg(rgb: np.ndarray) -> str:
-    bgr = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
-    done, content = cv2.imencode('.jpg', bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    if not done:
-        raise OSError('the picture could not be encoded')
-    return base64.b64encode(content.tobytes()).decode('ascii')

@@ -23,6 +23,9 @@ def show(
         '--out', help='Folder for report.html and the film.')] = None,
     rerun: Annotated[Path | None, typer.Option(
         '--rerun', metavar='FILE.rrd', help='Recording for the rerun viewer (extra viz).')] = None,
+    overlays: Annotated[bool, typer.Option(
+        '--overlays', help='Also write the picture of every frame, OUT/overlays/<stamp_ns>.png.',
+    )] = False,
     film: Annotated[str, typer.Option(
         '--film', help='Name of the film: .mp4, .webp or .gif.')] = 'film.mp4',
     body: Annotated[Path | None, typer.Option(
@@ -33,7 +36,15 @@ def show(
     slop: Annotated[float, typer.Option(
         '--slop', min=0.0, max=10.0, help='Largest difference of stamps of a pair (s).')] = 0.5,
 ) -> None:
-    """Draw recorded bodies over their recording: a page with 3D views, a film, or for rerun."""
+    """Draw recorded bodies over their recording: a page with 3D views, a film, or for rerun.
+
+      pop show recording.bag bodies --out look
+
+    writes look/report.html, which needs no network, and look/film.mp4. Bodies that were recorded
+    with --inputs are a recording as well:
+
+      pop show bodies bodies --out look --overlays
+    """
     from pop_core.body.default_body import default_body
     from pop_core.body.model_file import load_body_model
     from pop_ros.show_recording import ShowRequest
@@ -43,11 +54,12 @@ def show(
     model = default_body() if body is None else load_body_model(body)
     _draw(model, rerun, out, ShowRequest(
         recordings=tuple(recording), bodies=bodies, out=out or Path(), topics=(color, depth, info),
-        slop_s=slop, film=film))
+        slop_s=slop, film=film, overlays=overlays))
 
 
 def draw_replay(
-    replayed: ReplayRequest, out: Path | None, rerun: Path | None, notes: Sequence[str]
+    replayed: ReplayRequest, out: Path | None, rerun: Path | None, notes: Sequence[str],
+    *, overlays: bool,
 ) -> None:
     """Draw what a replay has just recorded, with what it said."""
     from pop_core.body.default_body import default_body
@@ -55,7 +67,7 @@ def draw_replay(
 
     _draw(default_body(), rerun, out, ShowRequest(
         recordings=replayed.bags, bodies=replayed.out, out=out or Path(), topics=replayed.topics,
-        slop_s=replayed.slop_s, notes=notes))
+        slop_s=replayed.slop_s, notes=notes, overlays=overlays))
 
 
 def _draw(

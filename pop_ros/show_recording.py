@@ -19,16 +19,19 @@ from pop_core.rgbd import RgbdFrame
 from pop_ros.bag_merge import MergedBags
 from pop_ros.bag_reader import BagMessage
 from pop_ros.bag_topics import RgbdTopics, find_topics
+from pop_ros.evenly import Evenly
 from pop_ros.from_messages import frame_from_messages
 from pop_ros.pairing import FramePairer
-from pop_ros.recorded_bodies import RecordedFrame, read_bodies, shown_bodies
+from pop_ros.recorded_bodies import RecordedFrame, iterate_bodies, shown_bodies
 from pop_ros.recording import Recording
 from pop_ros.replay import paired_frames
-from pop_ros.report import Report
+from pop_ros.report import Picture, Report
 from pop_ros.report3d import SceneFrame
+from pop_ros.result_folder import write_png
 
 MAX_PICTURES = 24  # of a page: 0.1 MB each
 MAX_SCENES = 6  # of a page: 0.7 MB each
+PAGE_PX = 1280  # width of its pictures
 FILM_HZ = 4.0  # slow enough to look at four panels
 LEGEND = (
     'Left to right, top to bottom: colour, depth, the fitted mesh with its skeleton (hollow '
@@ -55,6 +58,7 @@ class ShowRequest:
         slop_s: Largest difference of stamps of a pair [s].
         film: Name of the film; its suffix is the format.
         notes: What else the page should say, line by line.
+        overlays: Whether to write a picture of every frame too.
     """
 
     recordings: tuple[Path, ...]
@@ -64,6 +68,7 @@ class ShowRequest:
     slop_s: float = 0.5
     film: str = 'film.mp4'
     notes: Sequence[str] = ()
+    overlays: bool = False
 
     @property
     def name(self) -> str:
@@ -86,25 +91,29 @@ def show_recording(
     """
     request.out.mkdir(parents=True, exist_ok=True)
     film_path, page = request.out / request.film, request.out / 'report.html'
-    kept: list[tuple[SceneFrame, np.ndarray]] = []
+    scenes, pictures = Evenly[SceneFrame](MAX_SCENES), Evenly[Picture](MAX_PICTURES)
     counts = _Counts()
-    step = 1
     with SummaryFilm(film_path, FILM_HZ) as film:
         for scene in read_scenes(request, model):
             picture = four_panels(scene.frame, scene.bodies, model.f)
             film.add(picture)
-            if counts.frames % step == 0:
-                kept.append((scene, picture))
-            if len(kept) > 2 * MAX_PICTURES:
-                kept, step = kept[::2], 2 * step
+            if request.overlays:
+                _write_overlay(request.out / 'overlays', scene, picture)
+            scenes.add(scene)
+            pictures.add(Picture.encoded(picture, scene.caption, PAGE_PX))
             counts.add(scene.bodies)
             on_frame(counts.frames)
     if not counts.frames:
         raise ShowError(
             f'{request.name}: expected the recording that {request.bodies} was made of, '
             'found no frame with these stamps')
-    _write_page(page, request, model, _evenly(kept, MAX_PICTURES), counts)
+    _write_page(page, request, model, scenes.chosen(), pictures.chosen(), counts)
     return page, film_path
+
+
+def _write_overlay(folder: Path, scene: SceneFrame, picture: np.ndarray) -> None:
+    folder.mkdir(exist_ok=True)
+    write_png(folder / f'{scene.frame.stamp_ns}.png', picture)
 
 
 @dataclass(slots=True)
@@ -129,16 +138,22 @@ def read_scenes(request: ShowRequest, model: BodyModel) -> Iterator[SceneFrame]:
     Raises:
         PopError: If a bag cannot be read, or the bodies are not of this model.
     """
-    recorded = read_bodies(request.bodies)
-    if not recorded:
+    recorded = iterate_bodies(request.bodies)
+    bodies_ns, bodies = next(recorded, (None, RecordedFrame()))
+    if bodies_ns is None:
         raise ShowError(f'{request.bodies}: expected recorded bodies, found none')
-    first_ns, last_ns = min(recorded), max(recorded)
+    first_ns = bodies_ns
     with MergedBags(request.recordings) as bag:
         topics = find_topics(bag, *request.topics)
         for frame in _frames(bag, topics, request.slop_s):
-            if first_ns <= frame.stamp_ns <= last_ns:
-                bodies = _bodies(recorded.get(frame.stamp_ns), frame, model, request)
-                yield SceneFrame(frame, bodies, _caption(frame, bodies, first_ns))
+            while bodies_ns is not None and bodies_ns < frame.stamp_ns:
+                bodies_ns, bodies = next(recorded, (None, RecordedFrame()))
+            if bodies_ns is None:
+                return
+            if frame.stamp_ns >= first_ns:
+                present = bodies if bodies_ns == frame.stamp_ns else RecordedFrame()
+                people = _bodies(present, frame, model, request)
+                yield SceneFrame(frame, people, _caption(frame, people, first_ns))
 
 
 def _frames(bag: Recording, topics: RgbdTopics, slop_s: float) -> Iterator[RgbdFrame]:
@@ -151,10 +166,8 @@ def _frames(bag: Recording, topics: RgbdTopics, slop_s: float) -> Iterator[RgbdF
 
 
 def _bodies(
-    recorded: RecordedFrame | None, frame: RgbdFrame, model: BodyModel, request: ShowRequest
+    recorded: RecordedFrame, frame: RgbdFrame, model: BodyModel, request: ShowRequest
 ) -> list[ShownBody]:
-    if recorded is None:
-        return []
     for corners in recorded.triangles:
         if len(corners) != model.f.size:
             raise ShowError(
@@ -174,28 +187,21 @@ def _write_page(
     page: Path,
     request: ShowRequest,
     model: BodyModel,
-    kept: Sequence[tuple[SceneFrame, np.ndarray]],
+    scenes: Sequence[SceneFrame],
+    pictures: Sequence[Picture],
     counts: _Counts,
 ) -> None:
     report = Report(
         f'pop: {request.name}',
         f'Frames: {counts.frames}. Bodies: {counts.people}. The camera sees {counts.seen} of '
         f'their {counts.seen + counts.hidden} joints; the others were inferred.')
-    report.scenes([scene for scene, _ in _evenly(kept, MAX_SCENES)], model.f)
+    report.scenes(scenes, model.f)
     report.text(HOW_TO_TURN)
     report.heading('Frame by frame')
-    report.film([picture for _, picture in kept], [scene.caption for scene, _ in kept])
+    report.film(pictures)
     report.text(LEGEND)
     if request.notes:
         report.heading('What the replay said')
         report.commands(request.notes)
     report.text(f'Written by pop {__version__} from {request.bodies.name}.')
     report.write(page)
-
-
-def _evenly(
-    items: Sequence[tuple[SceneFrame, np.ndarray]], count: int
-) -> list[tuple[SceneFrame, np.ndarray]]:
-    """Return at most `count` items, the first and the last among them."""
-    chosen = np.unique(np.linspace(0, len(items) - 1, min(count, len(items))).astype(int))
-    return [items[i] for i in chosen]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pop_core.body.default_body import default_body
-from pop_ros.report import Report
+from pop_ros.report import Picture, Report
 from pop_ros.warm_up import CAMERA
 
 pytest.importorskip('rclpy', reason='the demo plays a bag to a ROS node')
@@ -70,7 +70,8 @@ def page(tmp_path):
     report.table(('name', 'value'), [('<b>', '1')])
     report.commands(['pop demo > log'])
     picture = np.full((8, 12, 3), (200, 30, 30), np.uint8)
-    report.film([picture, picture // 2], ['one </script>', 'two'])
+    report.film([Picture.encoded(rgb, caption, 640) for rgb, caption in (
+        (picture, 'one </script>'), (picture // 2, 'two'))])
     report.write(tmp_path / 'report.html')
     return (tmp_path / 'report.html').read_text(encoding='utf-8')
 

@@ -16,7 +16,8 @@ from support.node import ROOT
 from support.recording import Recording, record, write_frames
 
 from pop_core.body.default_body import default_body
-from pop_ros.show_recording import MAX_SCENES, ShowError, ShowRequest, _evenly, show_recording
+from pop_ros.evenly import Evenly
+from pop_ros.show_recording import ShowError, ShowRequest, show_recording
 
 
 @pytest.fixture(scope='module')
@@ -38,7 +39,7 @@ def drawn(recording: Recording, tmp_path_factory: pytest.TempPathFactory) -> Pat
     done = subprocess.run(
         [sys.executable, '-m', 'pop_ros.cli', 'replay', str(bag), '--every-frame', '--keypoints',
          'json', '--keypoints-dir', str(keypoints), '--out', str(folder / 'bodies'),
-         '--pictures', str(folder / 'pictures')],
+         '--pictures', str(folder / 'pictures'), '--overlays'],
         env={**os.environ, 'PYTHONPATH': str(ROOT)}, capture_output=True, text=True, timeout=240,
         check=False)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -66,10 +67,25 @@ def test_the_page_holds_a_3d_view_a_strip_and_what_the_replay_said(drawn: Path) 
     assert '2 frames fitted of 3 pairs' in text
 
 
-def test_a_long_recording_keeps_its_first_and_last_scene(drawn: Path) -> None:
-    assert MAX_SCENES >= 2
-    chosen = _evenly(list(range(1000)), MAX_SCENES)  # type: ignore[arg-type]
-    assert (chosen[0], chosen[-1], len(chosen)) == (0, 999, MAX_SCENES)
+def test_a_picture_of_every_frame_is_named_by_its_stamp(
+    drawn: Path, recording: Recording
+) -> None:
+    pictures = sorted((drawn / 'pictures' / 'overlays').iterdir())
+    assert [path.name for path in pictures] == [f'{stamp}.png' for stamp in recording.stamps]
+    height = recording.scenes[0].frame.camera.height
+    assert all(cv2.imread(str(path)).shape[0] > 2 * height for path in pictures)
+
+
+@pytest.mark.parametrize('total', [1, 2, 5, 6, 12, 13, 14, 100, 1000, 1023])
+def test_of_many_items_a_few_are_kept_evenly_with_the_first_and_the_last(total: int) -> None:
+    spread = Evenly[int](6)
+    for number in range(total):
+        spread.add(number)
+    chosen = spread.chosen()
+    assert (chosen[0], chosen[-1], len(chosen)) == (0, total - 1, min(6, total))
+    gaps = np.diff(chosen)
+    assert not len(gaps) or gaps.min() > 0
+    assert not len(gaps) or gaps.max() <= max(2, 0.4 * total)
 
 
 def test_bodies_of_another_body_model_are_refused(drawn: Path) -> None:
