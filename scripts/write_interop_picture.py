@@ -67,7 +67,8 @@ class Panel:
     def finish(self, crop: tuple[slice, slice]) -> np.ndarray:
         """Return the part around the person with its title."""
         part = np.ascontiguousarray(self.picture[crop])
-        cv2.putText(part, self._title, (12, 28), cv2.FONT_HERSHEY_SIMPLEX, 0.7, INK, 2, cv2.LINE_AA)
+        cv2.putText(
+            part, self._title, (12, 28), cv2.FONT_HERSHEY_SIMPLEX, 0.7, INK, 2, cv2.LINE_AA)
         return part
 
 

@@ -5,15 +5,15 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
 import rclpy
+import yaml
 from support import bodies_sender
 from support.estimates import estimate
 from support.message_packages import environment_with
-from support.node import RunningNode
+from support.node import ROOT, RunningNode
 from visualization_msgs.msg import Marker
 
 from pop_core.body.default_body import default_body
@@ -89,10 +89,17 @@ def test_bodies_of_another_model_are_refused_with_a_sentence() -> None:
     assert 'start the viewer with the file of the node' in viewer.output
 
 
+def test_the_rviz_configuration_shows_the_viewer_s_meshes_and_nothing_large_of_the_node() -> None:
+    text = (ROOT / 'rviz' / 'pop_viewer.rviz').read_text(encoding='utf-8')
+    displays = yaml.safe_load(text)['Visualization Manager']['Displays']
+    topics = [display['Topic']['Value'] for display in displays if 'Topic' in display]
+    assert topics == ['/pop_viewer/mesh', '/pop/joints']
+
+
 def test_without_the_messages_it_says_what_is_missing() -> None:
     done = subprocess.run(
         [sys.executable, '-m', 'pop_ros.cli', 'viewer'], capture_output=True, text=True,
-        timeout=60, check=False, cwd=Path(__file__).parents[2])
+        timeout=60, check=False, cwd=ROOT)
     if 'pop_msgs' not in done.stderr:
         pytest.skip('pop_msgs is installed here')
     assert done.returncode == 2
