@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import rclpy
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from benchmarks.node_camera import FRAME_ID, KINDS, as_messages
@@ -160,7 +161,7 @@ def table(title: str, rows: Rows) -> Table:
     """Return rows of equal keys as a table."""
     made = Table(title=title)
     for key in rows[0]:
-        made.add_column(key)
+        made.add_column(escape(key))  # units stand in brackets
     for row in rows:
         made.add_row(*(str(value) for value in row.values()))
     return made

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts.write_docs import parameters_page
+from scripts.write_docs import PARAMETER_FILE, parameter_file, parameters_page
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([ROOT / 'README.md', *(ROOT / 'docs').glob('*.md')])
@@ -12,6 +12,7 @@ PAGES = sorted([ROOT / 'README.md', *(ROOT / 'docs').glob('*.md')])
 def test_the_parameter_page_is_what_the_code_says():
     written = (ROOT / 'docs' / 'parameters.md').read_text(encoding='utf-8')
     assert written == parameters_page(), 'run: make docs'
+    assert PARAMETER_FILE.read_text(encoding='utf-8') == parameter_file(), 'run: make docs'
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda p: p.name)

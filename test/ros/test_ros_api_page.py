@@ -5,7 +5,6 @@ import re
 import yaml
 from support.node import ROOT
 
-from pop_core.config import PipelineConfig
 from pop_core.settings import list_settings
 from pop_ros.body_messages import OUTPUT_TYPES
 from pop_ros.camera_presets import CAMERA_PRESETS
@@ -53,13 +52,6 @@ def test_cameras_are_those_with_presets() -> None:
     named = re.search(r'`--camera ([^`]+)`', PAGE)
     assert named is not None
     assert set(named[1].split('|')) == set(CAMERA_PRESETS)
-
-
-def test_the_parameter_file_holds_known_settings_with_their_defaults() -> None:
-    given = yaml.safe_load((ROOT / 'config' / 'pop.yaml').read_text(encoding='utf-8'))
-    known = {item.name: item.default
-             for config in (NodeConfig(), PipelineConfig()) for item in list_settings(config)}
-    assert given['/pop']['ros__parameters'].items() <= known.items()
 
 
 def test_rviz_configurations_show_what_is_published() -> None:
