@@ -10,6 +10,7 @@ from pop_core.errors import PopError
 
 if TYPE_CHECKING:
     from pop_core.keypoints.boxes import BoxDetector, TopDownDetector
+    from pop_core.keypoints.depth_net import DepthNetDetector
     from pop_core.keypoints.detection import KeypointDetector
     from pop_core.keypoints.onnx_detector import OnnxSource
     from pop_core.keypoints.people_selection import PeopleConfig
@@ -44,26 +45,10 @@ def make_detector(
         SourceError: If there is no such source, or something that it needs is missing.
         NetworkShapeError: If a network fits no decoder.
     """
-    from pop_core.keypoints.boxes import BoxDetector, TopDownDetector
-    from pop_core.keypoints.detection import KeypointDetector
-    from pop_core.keypoints.fusion import FusedDetector
-
     words = split_sources(spec)
     if decoder is not None:
         words = _with_decoder(words, decoder)
-    sources = [_source(word, keypoints_dir, json_source) for word in words]
-    people = [source for source in sources if isinstance(source, KeypointDetector)]
-    boxes = [source for source in sources if isinstance(source, BoxDetector)]
-    top_down = [source for source in sources if isinstance(source, TopDownDetector)]
-    if boxes and not top_down:
-        raise SourceError(
-            f'keypoints: expected a network that looks into boxes beside one that finds them, '
-            f'found {spec} alone: add one such as rtmpose-m')
-    if top_down and not people and not boxes:
-        people = [_boxes_for(spec)]
-    if len(people) == 1 and not top_down:
-        return people[0]
-    return FusedDetector(people, boxes, top_down)
+    return _combined([_source(word, keypoints_dir, json_source) for word in words], spec)
 
 
 def split_sources(spec: str) -> list[str]:
@@ -102,6 +87,34 @@ def _parts(detector: object) -> Sequence[Any]:
     return [detector]
 
 
+def _combined(sources: Sequence[Source], spec: str) -> KeypointDetector:
+    """Return sources as one; who finds people in images and in boxes gets boxes if there are any.
+
+    Raises:
+        SourceError: If boxes are found that nobody looks into, or the other way round.
+    """
+    from pop_core.keypoints.boxes import BoxDetector, TopDownDetector
+    from pop_core.keypoints.detection import KeypointDetector
+    from pop_core.keypoints.fusion import FusedDetector
+
+    if len(sources) == 1 and isinstance(sources[0], KeypointDetector):
+        return sources[0]
+    boxes = [source for source in sources if isinstance(source, BoxDetector)]
+    top_down = [source for source in sources if isinstance(source, TopDownDetector)]
+    either = [source for source in top_down if isinstance(source, KeypointDetector)]
+    people: list[KeypointDetector] = [
+        source for source in sources
+        if isinstance(source, KeypointDetector) and not isinstance(source, TopDownDetector)]
+    if boxes and not top_down:
+        raise SourceError(
+            f'keypoints: expected a network that looks into boxes beside one that finds them, '
+            f'found {spec} alone: add one such as rtmpose-m')
+    if not people and not boxes:
+        people = [*either] or [_boxes_for(spec)]
+        top_down = [source for source in top_down if source not in either]
+    return FusedDetector(people, boxes, top_down)
+
+
 def _with_decoder(words: Sequence[str], decoder: str) -> list[str]:
     networks = [word for word in words if word not in ('json', 'depth')]
     if len(networks) != 1:
@@ -122,8 +135,13 @@ def _source(
 
 
 def _depth_detector() -> KeypointDetector:
-    raise SourceError(
-        f'keypoints: expected {SOURCES}, found depth: this version has no embedded network')
+    from pop_core.keypoints.depth_net import EMBEDDED, load_depth_net
+
+    if not EMBEDDED.is_file():
+        raise SourceError(
+            f'keypoints: expected {SOURCES}, found depth: this version has no embedded network; '
+            'docs/training.md tells how to train one')
+    return load_depth_net()
 
 
 def _boxes_for(spec: str) -> KeypointDetector:
@@ -147,8 +165,9 @@ def _json_detector(folder: Path | None) -> KeypointDetector:
     return OpenPoseJsonDetector(folder)
 
 
-def _network(word: str) -> OnnxSource:
+def _network(word: str) -> OnnxSource | DepthNetDetector:
     from pop_core.keypoints.decoders import DECODERS
+    from pop_core.keypoints.depth_net import DepthNetDetector, is_depth_net
     from pop_core.keypoints.onnx_detector import source_of
     from pop_core.keypoints.onnx_session import OnnxSession, load_network
     from pop_ros.network_registry import find_entry, verified_network
@@ -162,4 +181,7 @@ def _network(word: str) -> OnnxSource:
     if path.suffix != '.onnx' or not path.is_file():
         why = 'is not there' if not path.is_file() else 'does not end in .onnx'
         raise SourceError(f'keypoints: expected {SOURCES}, found {path}, which {why}')
-    return source_of(load_network(path), decoder)
+    session = load_network(path)
+    if decoder is None and is_depth_net(session):
+        return DepthNetDetector(session)
+    return source_of(session, decoder)

@@ -82,6 +82,11 @@ class TopDownDecoder(NetworkDecoder, Protocol):
 
 
 @runtime_checkable
+class OnePersonDecoder(PeopleDecoder, TopDownDecoder, Protocol):
+    """Finds the one person of a whole image as well as that of a box."""
+
+
+@runtime_checkable
 class BoxDecoder(NetworkDecoder, Protocol):
     """Finds where people are, without their joints."""
 

@@ -1,4 +1,4 @@
-"""Sources of people made of ONNX networks: three kinds of networks, one class each."""
+"""Sources of people made of ONNX networks: one class for each kind of network."""
 
 from __future__ import annotations
 
@@ -8,7 +8,12 @@ from pathlib import Path
 from pop_core.keypoints.boxes import PersonBox
 from pop_core.keypoints.decoders import choose_decoder, reason
 from pop_core.keypoints.detection import Detection
-from pop_core.keypoints.network import BoxDecoder, PeopleDecoder, TopDownDecoder
+from pop_core.keypoints.network import (
+    BoxDecoder,
+    OnePersonDecoder,
+    PeopleDecoder,
+    TopDownDecoder,
+)
 from pop_core.keypoints.onnx_session import OnnxSession, load_network
 from pop_core.keypoints.people_selection import PeopleConfig, select_people
 from pop_core.rgbd import RgbdFrame
@@ -60,6 +65,17 @@ class OnnxTopDownDetector:
         return select_people(frame, people, self.config)
 
 
+class OnnxOnePersonDetector(OnnxTopDownDetector):
+    """The same of a network that also finds the one person of a whole image."""
+
+    decoder: OnePersonDecoder
+
+    def detect(self, frame: RgbdFrame) -> list[Detection]:
+        """Return the person of a frame, or nobody."""
+        people = self.decoder.detect(frame.rgb, self.session.run)
+        return select_people(frame, people, self.config)
+
+
 class OnnxBoxDetector:
     """Boxes around people found by a network in the colour image."""
 
@@ -101,6 +117,8 @@ def source_of(session: OnnxSession, decoder: str | None = None) -> OnnxSource:
         NetworkShapeError: If the network fits no decoder or not the named one.
     """
     chosen = choose_decoder(session.spec, decoder, session.where)
+    if isinstance(chosen, OnePersonDecoder):
+        return OnnxOnePersonDetector(session, chosen)
     if isinstance(chosen, TopDownDecoder):
         return OnnxTopDownDetector(session, chosen)
     if isinstance(chosen, BoxDecoder):

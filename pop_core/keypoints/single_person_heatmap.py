@@ -1,17 +1,19 @@
 """One person per image by heatmaps of MPII's 16 joints, e.g. EfficientPose (Groos et al. 2021).
 
 Input: RGB / 255, ImageNet mean and standard deviation, float32, NHWC. Output: one map per joint;
-of several outputs the finest is read. The network looks at the whole image, then once more at the
-person when that fills less than half of it.
+of several outputs the finest is read. The network looks into the boxes of other sources; without
+them at the whole image, then once more at the person when that fills less than half of it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
 
+from pop_core.keypoints.boxes import PersonBox
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.keypoint_sets import MPII_16, shared_joints
 from pop_core.keypoints.letterbox import letterbox
@@ -27,7 +29,7 @@ PEAK_RADIUS = 0.012  # of the map's height: cells averaged around the largest
 
 
 class SinglePersonHeatmapDecoder:
-    """Finds the one person of an image."""
+    """Finds the one person of an image, or of each box."""
 
     name: ClassVar[str] = 'single_person_heatmap'
     expects: ClassVar[str] = (
@@ -60,13 +62,30 @@ class SinglePersonHeatmapDecoder:
         person = self._look(rgb, run)
         if person is None:
             return []
-        left, top, right, bottom = _crop(person.box_px, rgb.shape[0], rgb.shape[1])
-        if max(right - left, bottom - top) > SMALL_PERSON * max(rgb.shape[:2]):
+        region = _crop(person.box_px, rgb.shape[0], rgb.shape[1])
+        if region is None or _longer_side(region) > SMALL_PERSON * max(rgb.shape[:2]):
             return [person]
-        closer = self._look(np.ascontiguousarray(rgb[top:bottom, left:right]), run)
-        if closer is None:
-            return [person]
-        return [detection_of(closer.keypoints_px + [left, top], closer.scores)]
+        closer = self._look_into(rgb, person.box_px, run)
+        return [person if closer is None else closer]
+
+    def detect_in(
+        self, rgb: UInt8[np.ndarray, 'h w 3'], boxes: Sequence[PersonBox], run: Run
+    ) -> list[Detection]:
+        """Return one person for every box in which one is seen."""
+        found = (self._look_into(rgb, box.box_px, run) for box in boxes)
+        return [person for person in found if person is not None]
+
+    def _look_into(
+        self, rgb: UInt8[np.ndarray, 'h w 3'], box_px: Float[np.ndarray, '4'], run: Run
+    ) -> Detection | None:
+        region = _crop(box_px, rgb.shape[0], rgb.shape[1])
+        if region is None:
+            return None
+        left, top, right, bottom = region
+        person = self._look(np.ascontiguousarray(rgb[top:bottom, left:right]), run)
+        if person is None:
+            return None
+        return detection_of(person.keypoints_px + [left, top], person.scores)
 
     def _look(self, rgb: UInt8[np.ndarray, 'h w 3'], run: Run) -> Detection | None:
         image, placed = letterbox(rgb, self.height, self.width)
@@ -103,12 +122,23 @@ def heatmap_peaks(
     return places, heights
 
 
+def _longer_side(region: tuple[int, int, int, int]) -> int:
+    left, top, right, bottom = region
+    return max(right - left, bottom - top)
+
+
 def _crop(
     box_px: Float[np.ndarray, '4'], height: int, width: int
-) -> tuple[int, int, int, int]:
-    """Return whole pixels (left, top, right, bottom) of a box with some room around it."""
+) -> tuple[int, int, int, int] | None:
+    """Return whole pixels (left, top, right, bottom) of a box with some room around it.
+
+    None where the box and the image have no pixel in common.
+    """
+    if not np.isfinite(box_px).all():
+        return None
     margin = CROP_MARGIN * max(box_px[2] - box_px[0], box_px[3] - box_px[1])
-    left, top = np.floor(box_px[:2] - margin)
-    right, bottom = np.ceil(box_px[2:] + margin)
-    return (max(0, int(left)), max(0, int(top)), min(width, int(right)),
-            min(height, int(bottom)))
+    low = np.clip(np.floor(box_px[:2] - margin), 0, [width, height])
+    high = np.clip(np.ceil(box_px[2:] + margin), 0, [width, height])
+    if not (low < high).all():
+        return None
+    return int(low[0]), int(low[1]), int(high[0]), int(high[1])

@@ -16,8 +16,6 @@ from pop_ros.frame_folder import FrameFolder
 from pop_ros.keypoint_sources import SourceError, make_detector, reasons, split_sources
 from pop_ros.node_arguments import parse_arguments
 
-FLOAT = ((1, 3, 64, 64), 'float32')
-
 
 def zeros(*shape):
     return np.zeros(shape, np.float32)
@@ -30,10 +28,13 @@ def networks(tmp_path):
         'people': {'dets': zeros(1, 4, 5), 'keypoints': zeros(1, 4, 17, 3)},
         'top_down': {'simcc_x': zeros(1, 17, 128), 'simcc_y': zeros(1, 17, 128)},
         'boxes': {'out': zeros(1, 84, 100)},
+        'either': {'heat': zeros(1, 16, 16, 16)},
         'alike': {'dets': zeros(1, 4, 5), 'labels': np.zeros((1, 4), np.int64)},
     }
-    return {name: str(save_network(tmp_path / f'{name}.onnx', arrays, *FLOAT))
-            for name, arrays in outputs.items()}
+    shapes = {'either': (1, 64, 64, 3)}
+    return {name: str(save_network(
+        tmp_path / f'{name}.onnx', arrays, shapes.get(name, (1, 3, 64, 64)), 'float32'))
+        for name, arrays in outputs.items()}
 
 
 def test_one_network_is_itself(networks):
@@ -56,6 +57,18 @@ def test_boxes_and_a_network_that_looks_into_them_find_people(networks):
     detector = make_detector(f'{networks["boxes"]}, {networks["top_down"]}')
     assert isinstance(detector, KeypointDetector)
     assert detector.people == ()
+
+
+@pytest.mark.parametrize(('kinds', 'people', 'top_down'), [
+    (['either', 'people'], 'rtmo', 'single_person_heatmap'),
+    (['top_down', 'either'], 'single_person_heatmap', 'rtmpose'),
+])
+def test_who_finds_people_anywhere_gets_boxes_if_there_are_any(networks, kinds, people, top_down):
+    detector = make_detector(','.join(networks[kind] for kind in kinds))
+    assert [source.decoder.name for source in detector.people] == [people]
+    assert [source.decoder.name for source in detector.top_down] == [top_down]
+    alone = make_detector(networks['either'])
+    assert not isinstance(alone, FusedDetector)
 
 
 @pytest.mark.parametrize(('kinds', 'message'), [

@@ -1,4 +1,4 @@
-"""The PersonLab network on real frames; skipped where the shared data is not there."""
+"""Real networks on real frames; skipped where the shared data is not there."""
 
 import json
 from pathlib import Path
@@ -9,12 +9,14 @@ import pytest
 
 from pop_core.body.joints import SHARED_INDEX
 from pop_core.geometry.camera import Camera
+from pop_core.keypoints.fusion import FusedDetector
 from pop_core.keypoints.lifting import lift_keypoints
 from pop_core.keypoints.onnx_detector import load_source
 from pop_core.rgbd import RgbdFrame, clean_depth
 
 SHARED = Path(__file__).resolve().parents[4] / 'shared' / 'data'
 NETWORK = SHARED / 'models' / 'posenet_mobilenet_v1_075_481_641_dequant.onnx'
+CLOSER = SHARED / 'models' / 'EfficientPoseII.onnx'
 SOFA = ('00', '06', '12', '18', '24', '30', '36', '42', '48', '54', '60', '66')
 
 
@@ -63,3 +65,32 @@ def test_one_man_sits_on_the_sofa(detector, number):
     torso = lifted.positions_camera[SHARED_INDEX['neck']]
     # Seated: knees nearer to the camera than the shoulders.
     assert np.nanmedian(lifted.positions_camera[knees, 2]) < torso[2] + 0.1
+
+
+@pytest.fixture(scope='module')
+def fused(detector):
+    if not CLOSER.is_file():
+        pytest.skip(f'looked for {CLOSER}')
+    return FusedDetector([detector], top_down=[load_source(CLOSER)])
+
+
+def test_a_second_network_adds_joints_and_no_people(detector, fused):
+    frame = load('five_people')
+    alone, merged = detector.detect(frame), fused.detect(frame)
+    assert len(merged) == 5
+    lifted = [[int(lift_keypoints(frame, person).lifted.sum()) for person in people]
+              for people in (alone, merged)]
+    assert sum(lifted[1]) >= sum(lifted[0])
+    assert fused.detect(load('office_empty')) == []
+
+
+def test_a_shin_that_one_network_misses_is_found_by_the_other(detector, fused):
+    frame = load('sofa_pointing/42')
+    ankle = SHARED_INDEX['right_ankle']
+    (alone,), (merged,) = detector.detect(frame), fused.detect(frame)
+    assert alone.scores[ankle] == 0.0
+    assert merged.scores[ankle] > 0.2
+    both = alone.scores > 0
+    # Where both know a joint, it stays on the same limb.
+    gap = np.linalg.norm(merged.keypoints_px[both] - alone.keypoints_px[both], axis=1)
+    assert np.median(gap) < 20.0
