@@ -37,7 +37,7 @@ def main() -> None:
     array.bodies.append(spoilt)
     while True:
         publisher.publish(array)
-        time.sleep(0.1)
+        time.sleep(1.0)  # a Python receiver needs 0.2 s for each of two meshes
 
 
 if __name__ == '__main__':
