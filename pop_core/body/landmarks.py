@@ -61,8 +61,10 @@ def _foot_end(model: BodyModel, side: str, forward: int) -> int:
 
 
 def _on(model: BodyModel, *joints: str) -> Bool[np.ndarray, 'v']:
+    """Return which vertices these joints move most; all if there is none, as of no human body."""
     weight = sum(model.weights[:, JOINT_INDEX[name]] for name in joints)
-    return np.asarray(weight > 0.5)
+    found = np.asarray(weight > 0.5)
+    return found if found.any() else np.ones_like(found)
 
 
 def _head_height_m(model: BodyModel) -> float:

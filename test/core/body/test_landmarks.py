@@ -5,6 +5,7 @@ import numpy as np
 from pop_core.body.default_body import default_body
 from pop_core.body.joints import JOINT_INDEX
 from pop_core.body.landmarks import LANDMARK_JOINTS, LANDMARK_NAMES, landmark_vertices
+from pop_core.body.model import BodyModel
 
 
 def places() -> dict[str, np.ndarray]:
@@ -44,3 +45,9 @@ def test_each_landmark_lies_within_a_hand_of_the_joint_that_vouches_for_it() -> 
     away_m = np.linalg.norm(
         np.array(list(places().values())) - model.joint_template[LANDMARK_JOINTS], axis=1)
     assert away_m.max() < 0.15
+
+
+def test_a_body_without_face_and_feet_still_has_its_points(random_model: BodyModel) -> None:
+    found = landmark_vertices(random_model)
+    assert found.shape == (len(LANDMARK_NAMES),)
+    assert np.all((found >= 0) & (found < len(random_model.v_template)))
