@@ -75,7 +75,7 @@ def find_topics(
         missing = ' and '.join(name for name, topic in roles.items() if not topic)
         raise BagError(
             f'{bag.name}: expected an RGB-D camera, found no {missing} in '
-            f'{_listing(bag.topics)}; name topics with --color, --depth and --info')
+            f'{_listing(bag.topics)}; {_advice(bag)}')
     return RgbdTopics(found_color, found_depth, found_info)
 
 
@@ -134,6 +134,12 @@ def compressed_encoding(message: CompressedLike) -> str:
         return known
     # Drivers that compress themselves say 'jpeg' and no more; depth is never JPEG.
     return known if known in {*COLOR_CHANNELS, *DEPTH_TYPES} else 'rgb8'
+
+
+def _advice(bag: Recording) -> str:
+    if bag.damage:
+        return f'the bag is damaged ({bag.damage}), what was looked for may be behind the damage'
+    return 'name topics with --color, --depth and --info'
 
 
 def _sibling(color: str) -> str:

@@ -103,12 +103,14 @@ def paired_frames(
         return
     for message in bag.messages(topics.all):
         on_message()
+        # Where recording stopped for a while, what has waited belongs to the time before.
+        for pair in pairer.poll(message.time_ns):
+            yield BagFrame(pair.color, pair.depth, info)
         if message.topic == topics.info:
             info = message
             continue
         add = pairer.add_color if message.topic == topics.color else pairer.add_depth
-        stamp = stamp_ns(message.read().header)
-        for pair in add(stamp, message, message.time_ns):
+        for pair in add(stamp_ns(message.read().header), message, message.time_ns):
             yield BagFrame(pair.color, pair.depth, info)
     for pair in pairer.flush():
         yield BagFrame(pair.color, pair.depth, info)

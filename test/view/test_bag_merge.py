@@ -1,17 +1,21 @@
 """Several bags read like the one they are parts of, from a start for a duration."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support.bags import CAMERA, COLOR, DEPTH, Entry, rgbd_entries, write_bag
-from support.messages import TYPES, camera_info, depth_image, header, image
+from support.messages import IMAGE, INFO, TYPES, camera_info, depth_image, header, image
 
 from pop_core.geometry.camera import Camera
 from pop_ros.bag_merge import STATIC_TF, BagPart, MergedBags
-from pop_ros.bag_reader import BagError
+from pop_ros.bag_reader import BagError, BagMessage
 from pop_ros.bag_topics import find_topics
+from pop_ros.from_messages import frame_from_messages
+from pop_ros.pairing import FramePairer
+from pop_ros.replay import paired_frames
 from pop_ros.replay_inputs import TRANSFORMS
 
 SUFFIXES = ('.bag', '.db3', '.mcap')
@@ -118,3 +122,29 @@ def test_a_bag_without_the_chosen_topics_is_named(tmp_path: Path) -> None:
     other = write_bag(tmp_path / 'other.mcap', [('/other', *made[1][1:])])
     with MergedBags([write_bag(tmp_path / 'a.mcap', made), other]) as bags:
         assert bags.unused(ALL) == [str(other)]
+
+
+def test_frames_of_two_recordings_far_apart_keep_their_images_and_camera(tmp_path: Path) -> None:
+    paths = []
+    for number, (start_ns, f) in enumerate(((START_NS, 20.0), (START_NS + 40 * 10**9, 30.0))):
+        late = start_ns + 200_000_000  # of colour, which cannot be sure yet that nothing is nearer
+        rgb = np.full((12, 16, 3), number, np.uint8)
+        depth_m = np.full((12, 16), 1.0 + number, np.float32)
+        paths.append(write_bag(tmp_path / f'{number}.mcap', [
+            (CAMERA, INFO, late, camera_info(replace(CAM, fx=f), late)),
+            (COLOR, IMAGE, late, image(rgb, 'rgb8', late)),
+            (DEPTH, IMAGE, late + 1, depth_image(depth_m, '16UC1', start_ns))]))
+    pairer: FramePairer[BagMessage] = FramePairer(300_000_000)
+    with MergedBags(paths) as bags:
+        found = list(paired_frames(bags, find_topics(bags), pairer, lambda: None))
+    frames = [frame_from_messages(*(m.read() for m in (f.color, f.depth, f.info))) for f in found]
+    assert [(f.rgb[0, 0, 0], f.depth_m[0, 0], f.camera.fx) for f in frames] == [
+        (0, 1.0, 20.0), (1, 2.0, 30.0)]
+
+
+def test_a_bag_that_is_cut_before_its_depth_says_that_it_is_damaged(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / 'a.bag', entries(30))
+    text = bag.read_bytes()
+    bag.write_bytes(text[:text.index(DEPTH.encode())])
+    with MergedBags([bag]) as bags, pytest.raises(BagError, match='may be behind the damage'):
+        find_topics(bags)
