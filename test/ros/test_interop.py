@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from support import interop_sender
 from support.estimates import CAMERA, estimate
 from support.interop_sender import FRAME_ID, PEOPLE, STAMP_NS
@@ -31,7 +32,8 @@ MIDDLE, CUT, BESIDE = range(3)  # the people of PEOPLE
 
 @pytest.fixture(scope='module')
 def messages() -> dict[str, Any]:
-    environment = environment_with('hri_msgs', 'zed_msgs', 'vision_msgs', 'yolo_msgs')
+    environment = environment_with(
+        'pop_msgs', 'hri_msgs', 'zed_msgs', 'vision_msgs', 'yolo_msgs')
     done = subprocess.run(
         [sys.executable, interop_sender.__file__], env=environment, capture_output=True,
         text=True, check=False)
@@ -41,7 +43,7 @@ def messages() -> dict[str, Any]:
 
 @pytest.fixture(scope='module')
 def bodies() -> list[BodyEstimate]:
-    return [estimate(default_body(), seed, at_m) for seed, at_m in PEOPLE.items()]
+    return interop_sender.bodies(default_body())
 
 
 def place(body: BodyEstimate, name: str) -> np.ndarray:
@@ -201,6 +203,47 @@ def test_zed_boxes_have_their_corners_in_zed_s_order(
         head = np.array([c['kp'] for c in found['head_bounding_box_3d']['corners']])
         assert np.all((head.min(axis=0) < place(body, 'nose')) & (place(body, 'nose')
                                                                   < head.max(axis=0)))
+
+
+def test_zed_searches_for_people_who_are_predicted_only(messages: dict[str, Any]) -> None:
+    found = messages['zed_objects']['objects']
+    assert [o['tracking_available'] for o in found] == [False, True, True]
+    assert [o['tracking_state'] for o in found] == [1, 2, 2]  # ok, searching
+
+
+def test_bodies_say_everything_of_each_person(
+    messages: dict[str, Any], bodies: list[BodyEstimate]
+) -> None:
+    near = {'rtol': SINGLE, 'atol': SINGLE}
+    for found, number, body in zip(messages['bodies']['bodies'], PEOPLE, bodies, strict=True):
+        assert found['id'] == number
+        given = found['parameters']
+        for name in ('transl', 'global_orient', 'betas', 'scale'):
+            np.testing.assert_allclose(given[name], getattr(body.parameters, name), **near)
+        np.testing.assert_allclose(given['body_pose'], body.parameters.body_pose.ravel(), **near)
+        joints = found['joints']
+        assert [joint['state'] for joint in joints] == body.joint_state.tolist()
+        assert found['visible_fraction'] == pytest.approx(np.mean(body.joint_state == 0))
+        places = [xyz(joint['pose']['position']) for joint in joints]
+        np.testing.assert_allclose(places, body.joints)
+        turns = Rotation.from_quat([
+            [*xyz(joint['pose']['orientation']), joint['pose']['orientation']['w']]
+            for joint in joints])
+        np.testing.assert_allclose(turns.as_matrix(), body.joint_rotations, atol=1e-9)
+        np.testing.assert_allclose(
+            [joint['covariance'] for joint in joints], body.joint_covariance.reshape(24, 9),
+            **near)
+        assert dict(zip(found['energy_names'], found['energies'], strict=True)) == body.energies
+        assert found['score'] == pytest.approx(body.score)
+
+
+def test_bodies_say_how_fresh_a_person_is_and_that_nobody_is_tracked(
+    messages: dict[str, Any]
+) -> None:
+    found = messages['bodies']['bodies']
+    assert [b['track_state'] for b in found] == [255, 2, 3]
+    assert [b['age_s'] for b in found] == [0, 4.5, 4.5]
+    assert [b['unseen_s'] for b in found] == [0, 1, 1.5]
 
 
 def test_hri_skeletons_are_shares_of_the_image_and_unsure_outside_it(
