@@ -12,6 +12,7 @@ from jaxtyping import Float, Float32, Int
 
 from pop_core.geometry.camera import Camera
 
+STRIDE = 4  # canonical pixels per cell of the network's output
 SIDE_MULTIPLE = 32
 LARGEST_SIDE = 1024  # wider views than this many canonical pixels are cut at the sides
 NEIGHBOURS = ((0, 0), (0, 1), (1, 0), (0, -1), (-1, 0))
@@ -25,15 +26,13 @@ class CanonicalView:
         camera: Pinhole with sides divisible by 32.
         source_v: Row of the measured image per canonical pixel, -1 outside.
         source_u: Column of it.
-        pixel_v: Row of the canonical image per measured pixel, as a real number.
-        pixel_u: Column of it.
+        cell: Flat index of the network's output cell per measured pixel.
     """
 
     camera: Camera
     source_v: Int[np.ndarray, 'H W']
     source_u: Int[np.ndarray, 'H W']
-    pixel_v: Float32[np.ndarray, 'h w']
-    pixel_u: Float32[np.ndarray, 'h w']
+    cell: Int[np.ndarray, 'h w']
 
 
 def canonical_view(camera: Camera, focal_px: float) -> CanonicalView:
@@ -55,10 +54,11 @@ def canonical_view(camera: Camera, focal_px: float) -> CanonicalView:
     nearest = np.rint(np.nan_to_num(uv, nan=-1.0)).astype(np.int64)
     inside = ((nearest >= 0) & (nearest < [camera.width, camera.height])).all(axis=1)
     nearest[~inside] = -1
-    pixel = rays * focal_px + [cx, cy]
+    pixel = np.rint(np.nan_to_num(rays * focal_px + [cx, cy])).astype(np.int64)
+    column, row = np.clip(pixel, 0, [width - 1, height - 1]).transpose(2, 0, 1) // STRIDE
     return CanonicalView(
         view, nearest[:, 1].reshape(height, width), nearest[:, 0].reshape(height, width),
-        pixel[..., 1].astype(np.float32), pixel[..., 0].astype(np.float32))
+        row * (width // STRIDE) + column)
 
 
 def canonical_depth(

@@ -9,13 +9,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import cv2
 import numpy as np
 from jaxtyping import Float32, Int8
 
 from pop_core.errors import NetworkShapeError
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.body_parts import BACKGROUND, N_CLASSES
-from pop_core.keypoints.canonical_depth import CanonicalView, canonical_depth, canonical_view
+from pop_core.keypoints.canonical_depth import (
+    STRIDE,
+    CanonicalView,
+    canonical_depth,
+    canonical_view,
+)
 from pop_core.keypoints.depth_masks import label_pixels
 from pop_core.keypoints.depth_votes import (
     Cells,
@@ -31,7 +37,7 @@ from pop_core.keypoints.onnx_session import OnnxSession, load_network
 from pop_core.rgbd import RgbdFrame
 
 EMBEDDED = Path(__file__).parents[1] / 'data' / 'depth_net.onnx'
-FORMAT = '1'
+KIND, FORMAT = 'pop_depth_net', '1'
 OUTPUTS = (('parts', N_CLASSES), ('votes', 45), ('log_sigma', 15), ('visible', 15))
 EXPECTED = ('a depth network of this package: depth_m (1, 1, ?, ?) float32 -> '
             + ', '.join(f'{name} (1, {channels}, ?, ?)' for name, channels in OUTPUTS))
@@ -43,21 +49,26 @@ FOCAL_PX = (40.0, 1000.0)  # no network of this kind looks finer or coarser
 class DepthNetDetector:
     """People found by the depth network, in every camera's depth."""
 
-    def __init__(self, path: Path = EMBEDDED, config: DepthNetConfig | None = None) -> None:
-        """Load a network.
+    def __init__(self, session: OnnxSession, config: DepthNetConfig | None = None) -> None:
+        """Take a loaded network.
 
         Args:
-            path: The .onnx file written by `python -m pop_core.training export`.
+            session: A network written by `python -m pop_core.training export`.
             config: Settings of the decoding.
 
         Raises:
             NetworkShapeError: If it is no network of this kind.
         """
-        self.path = path
         self.config = config or DepthNetConfig()
-        self._session = load_network(path)
-        self.focal_px = _focal(self._session)
+        self.focal_px = _focal(session)
+        self._session = session
         self._view: tuple[tuple[object, ...], CanonicalView] | None = None
+
+    @property
+    def reason(self) -> str:
+        """Return what the network is."""
+        return (f'{self._session.where}: people from depth alone '
+                f'({self._session.facts.get("about", "nothing said about its training")})')
 
     def detect(self, frame: RgbdFrame) -> list[Detection]:
         """Return the people of a frame, best first."""
@@ -78,6 +89,22 @@ class DepthNetDetector:
         return self._view[1]
 
 
+def load_depth_net(
+    path: Path = EMBEDDED, config: DepthNetConfig | None = None
+) -> DepthNetDetector:
+    """Return the detector of a file, the embedded one by default.
+
+    Raises:
+        NetworkShapeError: If there is no such file or it is no network of this kind.
+    """
+    return DepthNetDetector(load_network(path), config)
+
+
+def is_depth_net(session: OnnxSession) -> bool:
+    """Return whether a network says that it is one of this kind."""
+    return KIND in session.facts
+
+
 def decode(
     outputs: Sequence[Tensor], depth_m: Float32[np.ndarray, 'H W'], view: CanonicalView,
     frame: RgbdFrame, config: DepthNetConfig,
@@ -93,7 +120,7 @@ def decode(
     """
     parts, votes, log_sigma, visible = outputs
     rows, columns = parts.shape[1:]
-    nearest = cell_depth(depth_m, view.camera.width // columns)
+    nearest = cell_depth(depth_m)
     probability = 1.0 - _softmax(parts)[BACKGROUND]
     shown = (probability > config.min_person_probability) & np.isfinite(nearest)
     row, column = np.nonzero(shown)
@@ -105,8 +132,7 @@ def decode(
         read_votes(votes, row, column, z, view.camera),
         np.exp(log_sigma[:, row, column].T.astype(np.float64)),
         1.0 / (1.0 + np.exp(-visible[:, row, column].T.astype(np.float64))))
-    stride = view.camera.width / columns
-    member = group_cells(cells, (z * stride / view.camera.fx) ** 2, config)
+    member = group_cells(cells, (z * STRIDE / view.camera.fx) ** 2, config)
     people = [fuse_votes(cells.chosen(member == k)) for k in range(member.max() + 1)]
     owner = np.full((rows, columns), -1, dtype=np.int64)
     owner[row, column] = member
@@ -116,13 +142,11 @@ def decode(
     return sorted((d for d in found if d is not None), key=lambda d: -d.score)
 
 
-def cell_depth(
-    depth_m: Float32[np.ndarray, 'h w'], stride: int
-) -> Float32[np.ndarray, 'h4 w4']:
+def cell_depth(depth_m: Float32[np.ndarray, 'h w']) -> Float32[np.ndarray, 'h4 w4']:
     """Return the nearest depth of each cell [m], +inf where nothing was measured."""
     h, w = depth_m.shape
     filled = np.where(depth_m > 0, depth_m, np.float32(np.inf))
-    return filled.reshape(h // stride, stride, w // stride, stride).min(axis=(1, 3))
+    return filled.reshape(h // STRIDE, STRIDE, w // STRIDE, STRIDE).min(axis=(1, 3))
 
 
 def _detection(
@@ -135,14 +159,14 @@ def _detection(
     uv = camera.project(person.joints)
     inside = (np.nan_to_num(uv, nan=-1.0) >= 0).all(axis=1) & (
         np.nan_to_num(uv, nan=-1.0) <= [camera.width - 1, camera.height - 1]).all(axis=1)
-    if not mask.any() or not inside.any():
+    left, top, width, height = cv2.boundingRect(mask.view(np.uint8))
+    if width == 0 or not inside.any():
         return None
     certain = 1.0 - np.exp(-GOOD_M / person.sigma_m)
-    v, u = np.nonzero(mask)
     return Detection(
         keypoints_px=np.where(inside[:, None], uv, np.nan),
         scores=np.where(inside, certain * person.probability, 0.0),
-        box_px=np.array([u.min(), v.min(), u.max(), v.max()], dtype=np.float64),
+        box_px=np.array([left, top, left + width - 1, top + height - 1], dtype=np.float64),
         joint_depth_m=np.where(inside, person.joints[:, 2], np.nan),
         joint_sigma_m=np.where(inside, np.sqrt(2.0) * person.sigma_m, np.nan),
         visible=person.visible, person_mask=mask,
@@ -160,7 +184,7 @@ def _focal(session: OnnxSession) -> float:
     Raises:
         NetworkShapeError: If it is of another kind or format.
     """
-    found = session.facts.get('pop_depth_net', 'none')
+    found = session.facts.get(KIND, 'none')
     outputs = tuple((o.name, o.shape[1] if len(o.shape) == 4 else None)
                     for o in session.spec.outputs)
     if found != FORMAT or outputs != OUTPUTS or len(session.spec.inputs) != 1:

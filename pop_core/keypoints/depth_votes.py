@@ -14,13 +14,14 @@ from jaxtyping import Bool, Float, Float32, Int
 
 from pop_core.body.joints import SHARED_INDEX
 from pop_core.geometry.camera import Camera
+from pop_core.keypoints.canonical_depth import STRIDE
 from pop_core.settings import setting
 
 TRUNK = np.array([SHARED_INDEX[name] for name in (
     'pelvis', 'left_hip', 'right_hip', 'neck', 'left_shoulder', 'right_shoulder')])
 BANDWIDTH_M = 0.15
 SHIFTS = 4
-MOST_CELLS = 1500  # of a trunk's search; more are thinned out
+MOST_CELLS = 700  # of a trunk's search; more are thinned out
 NEAREST_M = 0.15   # votes before this have no pixel
 HUBER_M = 0.10
 ROUNDS = 3
@@ -103,9 +104,8 @@ def read_votes(
         depth_m: Depth of the cells [m].
         camera: Pinhole of the network's input.
     """
-    stride = camera.width / votes.shape[2]
     offset = votes[:, row, column].T.reshape(-1, 15, 3).astype(np.float64)
-    middle = np.column_stack([column, row]) * stride + (stride - 1) / 2
+    middle = np.column_stack([column, row]) * float(STRIDE) + (STRIDE - 1) / 2
     scale = (camera.fx / depth_m)[:, None, None]
     uv = middle[:, None] + offset[..., :2] * scale
     z = np.maximum(depth_m[:, None] + offset[..., 2], NEAREST_M)

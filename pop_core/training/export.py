@@ -8,10 +8,11 @@ from pathlib import Path
 import onnx
 import torch
 
-from pop_core.training.network import STRIDE, DepthMaps, DepthNet
+from pop_core.keypoints.canonical_depth import STRIDE
+from pop_core.keypoints.depth_net import FORMAT, KIND
+from pop_core.training.network import DepthMaps, DepthNet
 
 OPSET = 17
-FORMAT = '1'
 
 
 def export_onnx(network: DepthNet, path: Path, about: str = '') -> None:
@@ -33,7 +34,7 @@ def export_onnx(network: DepthNet, path: Path, about: str = '') -> None:
             network.eval().cpu(), (example,), str(path), dynamo=False, opset_version=OPSET,
             input_names=['depth_m'], output_names=list(DepthMaps._fields), dynamic_axes=axes)
     model = onnx.load(path)
-    facts = {'pop_depth_net': FORMAT, 'focal_px': str(network.config.focal_px),
+    facts = {KIND: FORMAT, 'focal_px': str(network.config.focal_px),
              'stride': str(STRIDE), 'about': about}
     for key, value in facts.items():
         model.metadata_props.add(key=key, value=value)

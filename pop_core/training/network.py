@@ -16,7 +16,6 @@ from torch.nn import functional as F  # noqa: N812 - torch's own word for it
 
 from pop_core.keypoints.body_parts import N_CLASSES
 
-STRIDE = 4
 JOINTS = 15
 # Distances from the local mean that fill the relief channels' range [m]: limbs on trunks, people
 # before walls.

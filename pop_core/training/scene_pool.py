@@ -8,8 +8,10 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from pop_core.training.shards import Shard
+from pop_core.training.shards import OWNER_SHIFT, Shard
 from pop_core.training.targets import Batch
+
+SHOWN_PX = 200.0  # scenes with this many pixels of people are drawn twice as often as empty ones
 
 
 class ScenePool:
@@ -23,6 +25,7 @@ class ScenePool:
         self.received = 0
         self._arrays: list[Tensor] = []
         self._hidden = torch.zeros(capacity)
+        self._worth = torch.zeros(capacity)
 
     def add(self, shard: Shard) -> None:
         """Take scenes in, in place of the oldest when full."""
@@ -37,6 +40,7 @@ class ScenePool:
         for stored, array in zip(self._arrays, arrays, strict=True):
             stored[at.to(self.device)] = array.to(self.device)
         self._hidden[at] = hidden_share(shard)
+        self._worth[at] = worth(shard)
         self.received += len(shard)
         self.count = min(self.received, self.capacity)
 
@@ -44,10 +48,9 @@ class ScenePool:
         self, size: int, generator: torch.Generator, most_hidden: float = 1.0
     ) -> Batch:
         """Return a random batch of scenes of which at most a share of joints is hidden."""
-        allowed = torch.nonzero(self._hidden[: self.count] <= most_hidden)[:, 0]
-        if len(allowed) < size:
-            allowed = torch.arange(self.count)
-        return self.at(allowed[torch.randint(len(allowed), (size,), generator=generator)])
+        allowed = self._hidden[: self.count] <= most_hidden
+        chance = self._worth[: self.count] * (allowed if allowed.sum() >= size else 1.0)
+        return self.at(torch.multinomial(chance, size, replacement=True, generator=generator))
 
     def at(self, rows: Int[Tensor, 'n'] | Sequence[int]) -> Batch:
         """Return given scenes."""
@@ -61,3 +64,9 @@ def hidden_share(shard: Shard) -> Float[Tensor, 'n']:
     there = torch.from_numpy((shard.points != 0).any(axis=(2, 3)))
     hidden = ~torch.from_numpy(shard.visible) & there[:, :, None]
     return hidden.sum(dim=(1, 2)) / (15.0 * there.sum(dim=1)).clamp(min=1.0)
+
+
+def worth(shard: Shard) -> Float[Tensor, 'n']:
+    """Return how often each scene is drawn: the more it shows of people, the more it teaches."""
+    shown = (torch.from_numpy(shard.labels) >= 1 << OWNER_SHIFT).sum(dim=(1, 2))
+    return 1.0 + (shown / SHOWN_PX).sqrt()

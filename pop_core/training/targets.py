@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 from torch import Tensor
 from torch.nn import functional as F  # noqa: N812 - torch's own word for it
 
-from pop_core.training.network import STRIDE
+from pop_core.keypoints.canonical_depth import STRIDE
 from pop_core.training.shards import MAX_PEOPLE, OWNER_SHIFT
 
 NOTHING_M = 1e3

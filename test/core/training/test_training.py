@@ -8,7 +8,7 @@ from pop_core.training.shards import pack, save_shard
 
 torch = pytest.importorskip('torch')
 
-from pop_core.keypoints.depth_net import DepthNetDetector  # noqa: E402 - torch first
+from pop_core.keypoints.depth_net import load_depth_net  # noqa: E402 - torch first
 from pop_core.training.export import export_onnx  # noqa: E402
 from pop_core.training.losses import losses  # noqa: E402
 from pop_core.training.network import (  # noqa: E402
@@ -140,7 +140,7 @@ def test_onnx_says_what_torch_says(size, tmp_path, batch):
     for found, wanted in zip(session.run(depth_m.numpy()), expected, strict=True):
         np.testing.assert_allclose(found, wanted.numpy(), atol=1e-3)
     assert session.facts['focal_px'] == '80.0'
-    assert DepthNetDetector(tmp_path / 'net.onnx').focal_px == 80.0
+    assert load_depth_net(tmp_path / 'net.onnx').focal_px == 80.0
 
 
 def test_relief_is_the_same_near_and_far():
