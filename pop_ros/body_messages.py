@@ -128,4 +128,5 @@ class BodyMessages:
         # Meshes are drawn as a pinhole sees them.
         seen = undistort_frame(frame)
         people = [shown(body) for body in result.bodies]
-        return color_message(draw_people(seen.rgb, people, self._model.f, seen.camera), header)
+        picture = draw_people(seen.rgb, people, self._model.f, seen.camera, seen.depth_m)
+        return color_message(picture, header)

@@ -35,8 +35,9 @@ PAGE_PX = 1280  # width of its pictures
 FILM_HZ = 4.0  # slow enough to look at four panels
 LEGEND = (
     'Left to right, top to bottom: colour, depth, the fitted mesh with its skeleton (hollow '
-    'joints are hidden from the camera; the outline is what was segmented), and the scene from '
-    'the right and from above with the measured points of the people in black.')
+    'joints are hidden from the camera, faint limbs are behind something; the outline is what was '
+    'segmented), and the scene from the right and from above with measured points of the people '
+    'in black.')
 HOW_TO_TURN = (
     'Drag to turn, wheel to come nearer. White joints are seen by the camera, dark ones are '
     'hidden from it.')

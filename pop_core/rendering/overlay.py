@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Float, Float32, Int, UInt8
 
 from pop_core.body.joints import PARENTS
 from pop_core.estimate import JointState
@@ -15,7 +15,9 @@ from pop_core.rendering.palette import INK, PAPER, person_color
 from pop_core.rendering.shading import shade
 from pop_core.rendering.shown_body import ShownBody
 
-OPACITY = 0.72
+OPACITY, HIDDEN_OPACITY = 0.74, 0.34
+HIDDEN_M = 0.12  # so far behind what was measured: noise and the error of a fit are smaller
+EXPOSURE = 1.3  # of the mesh, which would look dull over a bright photograph
 SHIFT = 4  # fractional bits of cv2's coordinates: joints are drawn where they are
 AROUND_JOINT_M = 0.024
 
@@ -25,12 +27,21 @@ def draw_people(
     bodies: Sequence[ShownBody],
     f: Int[np.ndarray, 'm 3'],
     camera: Camera,
+    depth_m: Float32[np.ndarray, 'h w'] | None = None,
 ) -> UInt8[np.ndarray, 'h w 3']:
-    """Return the colour image with meshes, farthest first, then all skeletons."""
+    """Return the colour image with meshes, farthest first, then all skeletons.
+
+    Args:
+        rgb: Undistorted colour image.
+        bodies: People to draw.
+        f: Triangles of their meshes.
+        camera: Pinhole of the image.
+        depth_m: Measured depth of the image; limbs behind it are drawn faint.
+    """
     picture = rgb.copy()
     order = sorted(range(len(bodies)), key=lambda i: -float(bodies[i].joints[0, 2]))
     for index in order:
-        draw_mesh(picture, bodies[index].vertices, f, camera, person_color(index))
+        draw_mesh(picture, bodies[index].vertices, f, camera, person_color(index), depth_m)
     for index in order:
         draw_mask_contour(picture, bodies[index].mask, person_color(index))
         draw_skeleton(picture, bodies[index].joints, bodies[index].joint_state, camera)
@@ -43,11 +54,16 @@ def draw_mesh(
     f: Int[np.ndarray, 'm 3'],
     camera: Camera,
     color: tuple[int, int, int],
+    depth_m: Float32[np.ndarray, 'h w'] | None = None,
 ) -> None:
-    """Blend a shaded mesh into the picture."""
+    """Blend a shaded mesh into the picture, faintly where measured depth [m] stands before it."""
     rendered, shaded = shade(vertices_camera, f, camera, color)
     seen = rendered.covered
-    picture[seen] = np.rint(OPACITY * shaded[seen] + (1 - OPACITY) * picture[seen])
+    opacity = np.full(int(seen.sum()), OPACITY)
+    if depth_m is not None:
+        opacity[rendered.depth_m[seen] > depth_m[seen] + HIDDEN_M] = HIDDEN_OPACITY
+    lit = np.minimum(EXPOSURE * shaded[seen], 255)
+    picture[seen] = np.rint(opacity[:, None] * lit + (1 - opacity[:, None]) * picture[seen])
 
 
 def draw_mask_contour(

@@ -45,7 +45,7 @@ def result_panels(
     """
     seen = undistort_frame(frame)
     people = [replace(b, mask=undistorted_mask(b.mask, frame.camera)) for b in bodies]
-    overlay = draw_people(seen.rgb, people, f, seen.camera)
+    overlay = draw_people(seen.rgb, people, f, seen.camera, seen.depth_m)
     count = len(people)
     return [
         captioned(seen.rgb, 'colour'),

@@ -25,7 +25,8 @@ FROM_ABOVE = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])  # looks along camera
 VIEWER_M = 60.0
 MARGIN_M = 0.35
 SLAB_M = 0.6  # furniture beside a person, as seen by the viewer, is left out beyond this
-OPACITY = 0.6
+OPACITY = 0.75
+POINT_SHARE = 0.3  # of a mesh's pixels that its measured points may cover: its form stays readable
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,13 +78,15 @@ def draw_scene(
     _draw_points(picture, frame, view, bodies)
     farthest_first = sorted(
         enumerate(bodies), key=lambda item: -view.points(item[1].joints)[0, 2])
+    covered = dict.fromkeys(range(len(bodies)), 0)
     for index, body in farthest_first:
         rendered, shaded = shade(view.points(body.vertices), f, view.camera, person_color(index))
         seen = rendered.covered
         picture[seen] = np.rint(OPACITY * shaded[seen] + (1 - OPACITY) * picture[seen])
-    for body in bodies:
+        covered[index] = int(seen.sum())
+    for index, body in enumerate(bodies):
         points = point_cloud(frame, body.mask)[0]
-        v, u = _pixels(points, view)
+        v, u = _thinned(*_pixels(points, view), round(POINT_SHARE * covered[index]))
         picture[v, u] = INK
     _draw_scale(picture, view)
     return picture
@@ -124,10 +127,23 @@ def _pixels(
     return v[inside], u[inside]
 
 
+def _thinned(
+    v: Int[np.ndarray, 'n'], u: Int[np.ndarray, 'n'], count: int
+) -> tuple[Int[np.ndarray, 'k'], Int[np.ndarray, 'k']]:
+    """Return at most about `count` different pixels, spread evenly over those given."""
+    pixels = np.unique(np.column_stack([v, u]), axis=0)
+    if len(pixels) > max(count, 1):
+        # Always the same ones; every n-th of sorted pixels would make stripes.
+        rng = np.random.default_rng(0)
+        pixels = rng.choice(pixels, max(count, 1), replace=False)
+    return pixels[:, 0], pixels[:, 1]
+
+
 def _draw_scale(picture: UInt8[np.ndarray, 'h w 3'], view: SceneView) -> None:
     """Draw a bar of half a metre into the lower right corner."""
     length = round(0.5 * view.camera.fx / VIEWER_M)
     right, bottom = view.camera.width - 16, view.camera.height - 16
+    picture[bottom - 26: bottom + 8, right - length - 8: right + 8] = PAPER
     cv2.line(picture, (right - length, bottom), (right, bottom), FAINT, 2)
     for u in (right - length, right):
         cv2.line(picture, (u, bottom - 5), (u, bottom + 5), FAINT, 2)

@@ -1,10 +1,13 @@
 """Laws of the pictures: where things are drawn, not how beautiful they are."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pop_core.estimate import FrameResult, JointState
 from pop_core.geometry.camera import Camera
+from pop_core.rendering.depth_renderer import render_depth
 from pop_core.rendering.overlay import draw_people, draw_skeleton
 from pop_core.rendering.palette import INK, PAPER, person_color
 from pop_core.rendering.pictures import result_picture, undistorted_mask
@@ -73,6 +76,34 @@ def test_the_nearer_of_two_people_covers_the_farther():
 
 def _hue(rgb):
     return np.asarray(rgb, dtype=float) / np.linalg.norm(rgb)
+
+
+def test_what_stands_behind_measured_depth_is_drawn_faint():
+    shown, f = body()
+    rgb = np.full((CAMERA.height, CAMERA.width, 3), 90, np.uint8)
+    z = float(shown.joints[0, 2])
+    depth_m = np.full(rgb.shape[:2], z + 2, np.float32)
+    depth_m[CAMERA.height // 2:] = z - 1  # a table hides the lower half
+    seen, half_hidden = (draw_people(rgb, [shown], f, CAMERA, depth) for depth in (None, depth_m))
+    changed = np.abs(half_hidden.astype(int) - seen).sum(axis=2) > 0
+    assert changed[CAMERA.height // 2:].sum() > 100
+    assert not changed[:CAMERA.height // 2].any()
+    contrast = [np.abs(p.astype(int) - rgb).sum(axis=2)[changed].mean()
+                for p in (half_hidden, seen)]
+    assert contrast[0] < 0.6 * contrast[1]
+
+
+def test_measured_points_leave_most_of_a_mesh_to_be_seen():
+    shown, f = body()
+    covered = render_depth(shown.vertices, f, CAMERA)
+    depth_m = np.where(covered.covered, covered.depth_m, np.nan).astype(np.float32)
+    frame = RgbdFrame(np.zeros((*depth_m.shape, 3), np.uint8), depth_m, CAMERA)
+    view = fitting_view(FROM_THE_RIGHT, shown.vertices, CAMERA.width, CAMERA.height)
+    without = draw_scene(frame, [replace(shown, mask=np.zeros_like(covered.covered))], f, view)
+    points = draw_scene(frame, [replace(shown, mask=covered.covered)], f, view)
+    changed = (points != without).any(axis=2)
+    mesh = render_depth(view.points(shown.vertices), f, view.camera).covered
+    assert 0.02 < changed.sum() / mesh.sum() < 0.4
 
 
 def test_drawing_leaves_the_image_it_was_given_alone():
