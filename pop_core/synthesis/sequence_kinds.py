@@ -89,15 +89,16 @@ def _crossing(
     model: BodyModel, rng: np.random.Generator, middle_s: float, third: bool = False
 ) -> Script:
     """Two people walk to and fro behind a table; the nearer one hides the other in passing."""
-    stage = _stage(rng, _desk(rng, 1.6, 1.7), 3.9)
+    stage = _stage(rng, _desk(rng, 1.6, 1.55), 3.35)
     start_m = -min(middle_s * WALKING_M_S, 1.2)
-    near = Loop(np.array([0.0, 0.0, 0.1]), LEFT_TO_RIGHT, 2.3, -1.4, start_m)
-    far = Loop(np.array([0.0, 0.0, -1.3]), -LEFT_TO_RIGHT, 2.3, -1.4, start_m)
+    apart_m = 1.2 if third else 0.95
+    near = Loop(np.array([0.0, 0.0, 0.1]), LEFT_TO_RIGHT, 2.2, -1.1, start_m)
+    far = Loop(np.array([0.0, 0.0, 0.1 - apart_m]), -LEFT_TO_RIGHT, 2.2, -1.1, start_m)
     people = [_walker(model, near, rng), _walker(model, far, rng)]
     if third:
         betas, outfit = draw_look(model, rng)
         arms = draw_arm_poses(model, draw_pose(model, 'standing', rng), 6, rng)
-        spot = Place(np.array([-0.3, 0.0, -0.6]), 0.3)
+        spot = Place(np.array([-0.3, 0.0, -0.5]), 0.3)
         people.append(
             Performer(PoseToPose(model, betas, spot, arms, Tempo(0.7, 0.5)), outfit, 'reaching'))
     return Script(stage, tuple(people))
