@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Int8
@@ -164,6 +165,7 @@ def _seen(surface: Surface, T_camera_room: Float[np.ndarray, '4 4']) -> Surface:
                    surface.albedo, surface.texture)
 
 
+@lru_cache(maxsize=4)
 def part_of_face(model: BodyModel) -> Int[np.ndarray, 'm']:
     """Return the joint that moves each triangle most."""
     summed = model.weights[model.f].sum(axis=1)
