@@ -52,6 +52,7 @@ docs: $(VENV)/.tools
 pictures: $(VENV)/.tools
 	$(BIN)/python -m scripts.write_pictures docs/pictures
 	$(BIN)/python -m scripts.write_gallery docs/pictures
+	$(BIN)/python -m scripts.write_rviz_picture docs/pictures
 	$(BIN)/python -m scripts.write_interop_picture docs/pictures
 
 clean:

@@ -15,12 +15,12 @@ from geometry_msgs.msg import Point, Pose, PoseArray
 from rosbags.highlevel import AnyReader
 from sensor_msgs.msg import PointCloud2
 from support.node import ROOT
-from support.ros1_screen import PACKAGES, Ros1Screen, missing_programs, ros1_screen
 from visualization_msgs.msg import Marker
 
 from pop_ros.cdr import MarkerTemplate
 from pop_ros.qos import output_qos
 from pop_ros.to_messages import CLOUD_FIELDS, CLOUD_TYPE, make_header, mesh_marker
+from scripts.ros1_screen import PACKAGES, Ros1Screen, missing_programs, ros1_screen
 
 MISSING = missing_programs()
 STAMP_NS = 1_700_000_000_250_000_000

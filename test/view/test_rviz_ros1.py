@@ -13,13 +13,13 @@ import pytest
 from ruamel.yaml import YAML
 from support.node import ROOT
 from support.recording import record, write_frames
-from support.ros1_screen import PACKAGES, missing_programs, ros1_screen
 
 from pop_core.body.default_body import default_body
 from pop_core.geometry.camera import Camera
 from pop_core.rendering.depth_renderer import render_depth
 from pop_ros.recorded_bodies import RecordedFrame, mesh_vertices, read_bodies
 from pop_ros.to_messages import PALETTE
+from scripts.ros1_screen import PACKAGES, missing_programs, ros1_screen
 
 CONFIG = ROOT / 'rviz' / 'pop_ros1.rviz'
 SIZE = (1400, 900)

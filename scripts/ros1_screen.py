@@ -21,6 +21,7 @@ PACKAGES = 'rviz ros-core python3-rosbag xvfb imagemagick libgl1-mesa-dri'
 
 
 def missing_programs() -> list[str]:
+    """Return the programs that are needed and not installed."""
     return [name for name in PROGRAMS if shutil.which(name) is None]
 
 
@@ -55,6 +56,7 @@ class Ros1Screen:
             timeout=30, check=False).stdout
 
     def wait_for(self, done: Callable[[], bool], what: str, timeout_s: float = 60.0) -> None:
+        """Wait until something is done; fail with the programs' last words."""
         end_s = time.monotonic() + timeout_s
         while not done():
             told = self.log.read_text(errors='replace')[-3000:]
@@ -68,6 +70,7 @@ class Ros1Screen:
         return cv2.cvtColor(cv2.imread(str(path)), cv2.COLOR_BGR2RGB)
 
     def stop(self) -> None:
+        """End all programs."""
         for process in reversed(self._running):  # the X server last
             if process.poll() is None:
                 os.killpg(process.pid, signal.SIGINT)
