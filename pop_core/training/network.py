@@ -6,6 +6,7 @@ relative to its own measured surface and how sure it is of each, and which of th
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -90,6 +91,14 @@ class DepthNet(nn.Module):
             y = F.interpolate(y, scale_factor=2.0, mode='nearest') + lateral(feature)
         parts, votes, log_sigma, visible = self.head(y).split(OUTPUT_CHANNELS, dim=1)
         return DepthMaps(parts, votes, log_sigma.clamp(*SIGMA_LOG_RANGE), visible)
+
+
+    def hidden_weights(self) -> Iterator[nn.Parameter]:
+        """Yield the filters of all convolutions but the first and the last."""
+        outer = {id(self.stem[0].weight), id(self.head[-1].weight)}
+        for weight in self.parameters():
+            if weight.ndim == 4 and id(weight) not in outer:
+                yield weight
 
 
 class ResidualBlock(nn.Module):

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from pop_core.errors import PopError
 from pop_core.training.losses import losses
+from pop_core.training.muon import Muon
 from pop_core.training.network import DepthNet, NetworkConfig
 from pop_core.training.targets import Batch, make_targets
 
@@ -26,8 +27,10 @@ class TrainConfig:
 
     Args:
         batch: Images per step.
-        rate: Largest learning rate of AdamW (Loshchilov and Hutter 2019).
-        decay: Weight decay.
+        rate: Largest learning rate of AdamW (Loshchilov and Hutter 2019), which changes the first
+            and last layers, norms and biases.
+        matrix_rate: Largest learning rate of Muon, which changes all other convolutions.
+        decay: Weight decay of both.
         warm_up: Steps over which the rate rises.
         average: Share of the old average kept per step.
         curriculum: Images over which scenes go from hardly hidden people to all.
@@ -37,6 +40,7 @@ class TrainConfig:
 
     batch: int = 32
     rate: float = 2e-3
+    matrix_rate: float = 0.02
     decay: float = 0.02
     warm_up: int = 200
     average: float = 0.998
@@ -46,7 +50,7 @@ class TrainConfig:
 
 
 class Trainer:
-    """Network, averaged network and optimiser."""
+    """Network, averaged network and optimisers."""
 
     def __init__(
         self, device: torch.device, network: NetworkConfig | None = None,
@@ -57,9 +61,14 @@ class Trainer:
         self.config = config or TrainConfig()
         self.network = DepthNet(network).to(device, memory_format=torch.channels_last)
         self.averaged = deepcopy(self.network).eval()
-        self.optimiser = torch.optim.AdamW(
-            self.network.parameters(), self.config.rate, weight_decay=self.config.decay,
-            fused=True)
+        matrices = list(self.network.hidden_weights())
+        known = {id(weight) for weight in matrices}
+        others = [weight for weight in self.network.parameters() if id(weight) not in known]
+        self.optimisers: dict[str, torch.optim.Optimizer] = {
+            'matrices': Muon(matrices, self.config.matrix_rate, decay=self.config.decay),
+            'others': torch.optim.AdamW(
+                others, self.config.rate, weight_decay=self.config.decay, fused=True),
+        }
         self.steps = 0
         self.images = 0
         self.history: list[dict[str, float]] = []
@@ -71,9 +80,11 @@ class Trainer:
             batch: Images of the network's input size.
             rate_factor: Multiplies the learning rate, for the end of a training.
         """
-        rate = self.config.rate * min(1.0, (self.steps + 1) / self.config.warm_up) * rate_factor
-        for group in self.optimiser.param_groups:
-            group['lr'] = rate
+        factor = min(1.0, (self.steps + 1) / self.config.warm_up) * rate_factor
+        rates = {'matrices': self.config.matrix_rate, 'others': self.config.rate}
+        for name, optimiser in self.optimisers.items():
+            for group in optimiser.param_groups:
+                group['lr'] = rates[name] * factor
         targets = make_targets(batch)
         self.network.train()
         # bfloat16 needs no scaling of the loss; on CPUs it is slower than float32 here.
@@ -82,10 +93,11 @@ class Trainer:
                 memory_format=torch.channels_last))
         terms = losses(maps, targets)
         total = torch.stack(list(terms.values())).sum()
-        self.optimiser.zero_grad(set_to_none=True)
+        self.network.zero_grad(set_to_none=True)
         total.backward()
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), self.config.clip)
-        self.optimiser.step()
+        for optimiser in self.optimisers.values():
+            optimiser.step()
         self.steps += 1
         self.images += len(batch.depth_m)
         self._average()
@@ -110,7 +122,8 @@ class Trainer:
         """Write everything that a later run needs to go on."""
         _write(path, {
             'network_config': asdict(self.network.config), 'network': self.network.state_dict(),
-            'averaged': self.averaged.state_dict(), 'optimiser': self.optimiser.state_dict(),
+            'averaged': self.averaged.state_dict(),
+            'optimisers': {name: o.state_dict() for name, o in self.optimisers.items()},
             'steps': self.steps, 'images': self.images, 'history': self.history,
         })
 
@@ -134,8 +147,8 @@ class Trainer:
         try:
             self.averaged.load_state_dict(state['averaged'])
             self.network.load_state_dict(state.get('network', state['averaged']))
-            if 'optimiser' in state:
-                self.optimiser.load_state_dict(state['optimiser'])
+            for name, content in state.get('optimisers', {}).items():
+                self.optimisers[name].load_state_dict(content)
         except (RuntimeError, ValueError) as error:
             raise CheckpointError(
                 f'{path}: expected weights of a network as {self.network.config}, found '

@@ -11,6 +11,7 @@ torch = pytest.importorskip('torch')
 from pop_core.keypoints.depth_net import load_depth_net  # noqa: E402 - torch first
 from pop_core.training.export import export_onnx  # noqa: E402
 from pop_core.training.losses import losses  # noqa: E402
+from pop_core.training.muon import orthogonal  # noqa: E402
 from pop_core.training.network import (  # noqa: E402
     DepthMaps,
     NetworkConfig,
@@ -86,6 +87,16 @@ def test_perfect_maps_score_full_marks(batch):
     figures = scores.figures()
     assert figures['pck_visible'] == figures['pck_hidden'] == 1.0
     assert figures['person_iou'] == figures['sight'] == 1.0
+
+
+@pytest.mark.parametrize('shape', [(8, 20), (20, 8), (6, 12)], ids=str)
+def test_the_steps_of_matrices_turn_and_do_not_stretch(shape):
+    torch.manual_seed(3)
+    matrix = torch.randn(shape)
+    singular = torch.linalg.svdvals(orthogonal(matrix))
+    assert 0.6 < singular.min() < singular.max() < 1.3  # what the quintic's iterates keep to
+    u, _, vt = torch.linalg.svd(matrix, full_matrices=False)
+    assert ((u @ vt) * orthogonal(matrix)).sum() > 0.75 * min(shape)
 
 
 def test_training_lowers_every_loss(batch):
