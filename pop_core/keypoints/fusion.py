@@ -7,7 +7,7 @@ places are averaged by precision; where they do not, the most confident one is b
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -18,7 +18,7 @@ from pop_core.keypoints.keypoint_similarity import (
     common_size_px,
     joint_similarity,
     mirrored,
-    person_similarity,
+    person_similarities,
 )
 from pop_core.keypoints.people import detection_of
 from pop_core.rgbd import RgbdFrame
@@ -86,39 +86,25 @@ def fuse(
         config: Settings; None takes the defaults.
     """
     config = config or FusionConfig()
-    people = [(person, source) for source, group in enumerate(found) for person in group]
-    groups: list[_Group] = []
-    for person, source in sorted(people, key=lambda item: -item[0].score):
-        likeness = [group.likeness(person, config.mirror_gain) for group in groups]
-        best = int(np.argmax(likeness)) if likeness else -1
-        if best >= 0 and likeness[best] >= config.same_person:
-            groups[best].join(person, source, config.mirror_gain)
-        else:
-            groups.append(_Group([person], {source}))
-    merged = [merge(group.members, config.same_joint) for group in groups]
+    named = [(person, source) for source, group in enumerate(found) for person in group]
+    named.sort(key=lambda item: -item[0].score)
+    people, sources = [person for person, _ in named], [source for _, source in named]
+    same = person_similarities(people, people)
+    turned = [mirrored(person) for person in people]
+    turned_same = person_similarities(people, turned) - config.mirror_gain
+    groups: dict[int, dict[int, Detection]] = {}  # by the best member: a detection per source
+    for i, person in enumerate(people):
+        leaders = list(groups)
+        likeness = np.maximum(same[leaders, i], turned_same[leaders, i])
+        if not leaders or likeness.max() < config.same_person:
+            groups[i] = {sources[i]: person}
+            continue
+        leader = leaders[int(likeness.argmax())]
+        facing = person if same[leader, i] >= turned_same[leader, i] else turned[i]
+        # A second one of the same source is a double, and worse than the one that is there.
+        groups[leader].setdefault(sources[i], facing)
+    merged = [merge(list(group.values()), config.same_joint) for group in groups.values()]
     return sorted(merged, key=lambda person: -person.score)
-
-
-@dataclass(slots=True)
-class _Group:
-    """Detections of one person, the best first, at most one of each source."""
-
-    members: list[Detection]
-    sources: set[int] = field(default_factory=set)
-
-    def likeness(self, person: Detection, gain: float) -> float:
-        return max(person_similarity(self.members[0], person),
-                   person_similarity(self.members[0], mirrored(person)) - gain)
-
-    def join(self, person: Detection, source: int, gain: float) -> None:
-        if source in self.sources:
-            return  # the same source's better detection is here already
-        first = self.members[0]
-        turned = mirrored(person)
-        if person_similarity(first, turned) > person_similarity(first, person) + gain:
-            person = turned
-        self.members.append(person)
-        self.sources.add(source)
 
 
 def merge(members: Sequence[Detection], same_joint: float) -> Detection:
@@ -136,7 +122,7 @@ def merge(members: Sequence[Detection], same_joint: float) -> Detection:
     scores = np.stack([member.scores for member in members])
     surest = scores.argmax(axis=0)
     leader = uv[surest, np.arange(uv.shape[1])]
-    size_px = max(common_size_px(members[0], member) for member in members)
+    size_px = common_size_px(members)
     agree = (joint_similarity(uv, leader, size_px) >= same_joint) & (scores > 0)
     weight = np.where(agree, scores**2, 0.0)
     total = weight.sum(axis=0)

@@ -19,6 +19,7 @@ from pop_core.keypoints.people_selection import PeopleConfig, select_people
 from pop_core.rgbd import RgbdFrame
 
 MOST_BOXES = 20  # a top-down network runs once for each
+MOST_PEOPLE = 100  # each is lifted to be examined; a network that sees more sees noise
 
 
 class OnnxKeypointDetector:
@@ -39,7 +40,7 @@ class OnnxKeypointDetector:
 
     def detect(self, frame: RgbdFrame) -> list[Detection]:
         """Return the people of a frame, best first."""
-        people = self.decoder.detect(frame.rgb, self.session.run)
+        people = self.decoder.detect(frame.rgb, self.session.run)[:MOST_PEOPLE]
         return select_people(frame, people, self.config)
 
 

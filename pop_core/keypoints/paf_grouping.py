@@ -61,8 +61,8 @@ def group_people(
         fields: Pairs of maps of the limbs.
         limbs: Each after the one that ends in its first keypoint.
     """
-    candidates = [find_peaks(np.nan_to_num(channel)) for channel in heat]
-    fields = np.nan_to_num(fields)
+    candidates = [find_peaks(np.nan_to_num(channel).clip(0.0, 1.0)) for channel in heat]
+    fields = np.nan_to_num(fields).clip(-1.0, 1.0)  # unit vectors, or less than that
     people: list[Float[np.ndarray, 'k 3']] = []
     owner: dict[tuple[int, int], int] = {}
     for j in _in_order(limbs):

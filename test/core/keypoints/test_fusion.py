@@ -9,7 +9,7 @@ from pop_core.body.joints import SHARED_INDEX
 from pop_core.keypoints.boxes import PersonBox
 from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.keypoints.fusion import FusedDetector, FusionConfig, fuse, merge
-from pop_core.keypoints.keypoint_similarity import mirrored, person_similarity
+from pop_core.keypoints.keypoint_similarity import mirrored, person_similarities
 from pop_core.keypoints.people import detection_of
 
 WRIST = SHARED_INDEX['left_wrist']
@@ -23,6 +23,10 @@ def person(shift_px=0.0, score=0.8, noise_px=0.0, seed=0, missing=()):
     scores = np.full(15, score)
     scores[[SHARED_INDEX[name] for name in missing]] = 0.0
     return detection_of(uv, scores)
+
+
+def person_similarity(a, b):
+    return float(person_similarities([a], [b])[0, 0])
 
 
 def same(a, b):
