@@ -33,7 +33,7 @@ def heard() -> dict[str, Any]:
     sender = subprocess.Popen([sys.executable, SENDER], env=environment)
     try:
         done = subprocess.run([sys.executable, LISTENER], env=environment, capture_output=True,
-                              text=True, timeout=60, check=False)
+                              text=True, timeout=70, check=False)
     finally:
         sender.kill()
         sender.wait()
@@ -48,6 +48,7 @@ def test_bodies_are_listed_and_their_topics_go_with_them(heard: dict[str, Any]) 
     topics = [[f'/humans/bodies/{body}/{name}' for name in PER_BODY] for body in IDS]
     assert heard['before'] == sorted([*topics[0], *topics[1], tracked])
     assert heard['after'] == sorted([*topics[0], tracked])
+    assert heard['off'] == []
 
 
 def test_every_message_has_stamp_and_frame_of_the_image(heard: dict[str, Any]) -> None:

@@ -11,7 +11,7 @@ from tf2_msgs.msg import TFMessage
 
 KINDS = {'roi': NormalizedRegionOfInterest2D, 'cropped': Image, 'skeleton2d': Skeleton2D,
          'joint_states': JointState}
-TIMEOUT_S = 40.0
+TIMEOUT_S = 50.0
 
 
 def main() -> None:
@@ -35,10 +35,13 @@ def main() -> None:
     spin(lambda: len(found) == len(KINDS))
     before = topics(node)
     spin(lambda: len(lists[-1].ids) < len(first) and topics(node) != before)
+    after = topics(node)
+    spin(lambda: not topics(node))
     print(json.dumps({  # noqa: T201 - what the test reads
         'first': first, 'last': list(lists[-1].ids), 'header': plain(lists[0].header),
         'found': {name: plain(message) for name, message in found.items()},
-        'frames': plain(frames[0].transforms), 'before': before, 'after': topics(node)}))
+        'frames': plain(frames[0].transforms), 'before': before, 'after': after,
+        'off': topics(node)}))
 
 
 def topics(node) -> list[str]:

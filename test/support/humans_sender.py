@@ -1,6 +1,6 @@
-"""Publishes people as REP-155 asks, like the node: two bodies, of whom one leaves, until ended.
+"""Publishes people as REP-155 asks, like the node, until ended.
 
-python humans_sender.py; the first body stays, the second is there in the first 40 frames.
+There are two bodies; then one has left; at last the node is told to say nothing below /humans.
 """
 
 import time
@@ -18,7 +18,7 @@ from pop_ros.to_messages import make_header
 STAMP_NS = 1_700_000_000_987_654_321
 FRAME_ID = 'optical'
 STAYS, LEAVES = 3, 4
-FRAMES_WITH_BOTH = 40
+FRAMES_WITH_BOTH, FRAMES_WITH_ONE = 40, 40
 
 
 def main() -> None:
@@ -33,12 +33,12 @@ def main() -> None:
     topics.switch(True)
     while not topics.is_heard():
         time.sleep(0.05)
-    shown = 0
-    while True:
-        seen = people if shown < FRAMES_WITH_BOTH else people[:1]
+    for seen in [people] * FRAMES_WITH_BOTH + [people[:1]] * FRAMES_WITH_ONE:
         topics.publish(HumansFrame(seen, frame, header))
-        shown += 1
         time.sleep(0.1)
+    topics.switch(False)
+    topics.publish(HumansFrame(people, frame, header))
+    time.sleep(60)
 
 
 if __name__ == '__main__':
