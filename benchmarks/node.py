@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import rclpy
+from rclpy.serialization import serialize_message
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -111,11 +112,16 @@ def measure_messages(scene: SyntheticScene) -> Rows:
 
         message = build()
         rows.append({
-            'topic': f'~/{name}', 'build [ms]': milliseconds(build),
+            'topic': f'~/{name}', 'bytes': size(message), 'build [ms]': milliseconds(build),
             'publish [ms]': milliseconds(lambda p=publisher, m=message: p.publish(m))})
     node.destroy_node()
     rclpy.shutdown()
     return rows
+
+
+def size(message: Any) -> int:
+    """Return how many bytes of a message, or of its serialised form, are sent."""
+    return len(message if isinstance(message, bytes) else serialize_message(message))
 
 
 def measure_inputs(frame: RgbdFrame) -> Rows:
