@@ -64,7 +64,7 @@ def train(trainer: Trainer, config: RunConfig, say: Callable[[str], None]) -> No
         trainer.load(checkpoint)
         say(f'going on after {trainer.images} images')
     focal_px = trainer.network.config.focal_px
-    seed = config.seed + trainer.steps  # a run that goes on must not see the same scenes again
+    seed = config.seed + trainer.images  # a run that goes on must not see the same scenes again
     with SceneStream(config.workers, seed, config.size, focal_px, config.mocap) as stream:
         pool = _filled(config, trainer.device, stream, say)
         _loop(trainer, config, pool, stream, say)
@@ -90,7 +90,7 @@ def _loop(
     trainer: Trainer, config: RunConfig, pool: ScenePool, stream: SceneStream,
     say: Callable[[str], None],
 ) -> None:
-    generator = torch.Generator().manual_seed(config.seed + trainer.steps)
+    generator = torch.Generator().manual_seed(config.seed + trainer.images)
     begin = told = saved = time.monotonic()
     end = begin + 60.0 * config.minutes
     already = trainer.images
@@ -137,10 +137,11 @@ class _Means:
 def _record(
     trainer: Trainer, config: RunConfig, terms: dict[str, float], say: Callable[[str], None]
 ) -> None:
-    """Write checkpoint, history and curves."""
+    """Write checkpoint, weights, history and curves."""
     figures = validate(trainer, config)
     trainer.history.append({'images': float(trainer.images), **terms, **figures})
     trainer.save(config.out / 'checkpoint.pt')
+    trainer.save_weights(config.out / 'weights.pt')
     history = json.dumps(trainer.history, indent=1)
     (config.out / 'history.json').write_text(history + '\n', encoding='utf-8')
     save_curves(trainer.history, config.out / 'curves.png')
