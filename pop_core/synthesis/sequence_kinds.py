@@ -18,6 +18,7 @@ from pop_core.synthesis.occluders import bare_table, chair_for
 from pop_core.synthesis.people import seat_fit
 from pop_core.synthesis.poses import ScenePose, draw_pose
 from pop_core.synthesis.rooms import draw_clutter, draw_room, varied
+from pop_core.synthesis.scenes import ATTEMPTS, SceneError
 from pop_core.synthesis.sequence_names import SequenceKind
 from pop_core.synthesis.sequence_people import Motion, Performer, draw_look
 from pop_core.synthesis.sequence_poses import PoseToPose, Tempo, draw_arm_poses
@@ -67,6 +68,9 @@ def draw_script(
         kind: What happens.
         rng: Randomness.
         middle_s: Middle of a short sequence, when walkers shall be in the middle of the image [s].
+
+    Raises:
+        SceneError: If no chair fits anybody.
     """
     return _SCRIPTS[kind](model, rng, middle_s)
 
@@ -139,11 +143,14 @@ def _sitting(model: BodyModel, rng: np.random.Generator, middle_s: float) -> Scr
     standing = draw_pose(model, 'standing', rng)
     tempo = Tempo(1.3, min(1.2, middle_s))
     spot = Place(ON_SPOT, rng.normal(0, 0.2))
-    chair = None
-    while chair is None:
+    for _ in range(ATTEMPTS):
         seated = draw_pose(model, 'seated', rng)
         motion = PoseToPose(model, betas, spot, [standing, seated], tempo)
         chair = _chair(model, motion, spot, tempo, rng)
+        if chair is not None:
+            break
+    else:
+        raise SceneError(f'expected a pose that fits a chair, found none in {ATTEMPTS}')
     desk = _desk(rng, 1.3, 1.05)
     return Script(_stage(rng, desk + chair, 2.9), (Performer(motion, outfit, 'sitting'),))
 
