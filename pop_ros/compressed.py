@@ -51,7 +51,7 @@ def decode_compressed_color(message: CompressedLike) -> UInt8[np.ndarray, 'h w 3
         raise BadMessageError(
             f'color image: expected a colour image, found format {message.format!r}: is a depth '
             'topic remapped to color/image?')
-    image = cv2.imdecode(np.frombuffer(message.data, dtype=np.uint8), cv2.IMREAD_COLOR)
+    image = _decoded(message.data, cv2.IMREAD_COLOR)
     if image is None:
         raise BadMessageError(
             f'color image: expected a JPEG or PNG, found {len(message.data)} bytes of format '
@@ -88,13 +88,21 @@ def decode_compressed_depth(message: CompressedLike) -> Float32[np.ndarray, 'h w
     return clean_depth(np.where(raw == 0, np.float32(np.nan), depth_m).astype(np.float32))
 
 
+def _decoded(data: Any, flags: int) -> np.ndarray | None:
+    """Return the pixels of a PNG or JPEG; None for data that is neither, or is damaged."""
+    try:
+        return cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
+    except cv2.error:  # no data at all, or a size that OpenCV refuses
+        return None
+
+
 def _metres(raw: UInt16[np.ndarray, 'h w']) -> Float32[np.ndarray, 'h w']:
     return clean_depth(raw.astype(np.float32) * np.float32(0.001))
 
 
 def _raw_depth(payload: bytes, name: str) -> UInt16[np.ndarray, 'h w']:
     if payload.startswith(PNG_MAGIC):
-        raw = cv2.imdecode(np.frombuffer(payload, dtype=np.uint8), cv2.IMREAD_UNCHANGED)
+        raw = _decoded(payload, cv2.IMREAD_UNCHANGED)
         if raw is not None and raw.dtype == np.uint16 and raw.ndim == 2:
             return np.asarray(raw)
     elif 'rvl' in name.lower() and len(payload) > RVL_SIZE.size:

@@ -20,6 +20,7 @@ class TopicReport:
         rate_hz: Messages per second since the last report.
         last_stamp_ns: Stamp of the newest message [ns], or None.
         others: Topics of the same type that are published.
+        asked: Quality of service asked for, as text; '' while not subscribed.
     """
 
     role: str
@@ -29,6 +30,12 @@ class TopicReport:
     rate_hz: float
     last_stamp_ns: int | None
     others: tuple[str, ...] = ()
+    asked: str = ''
+
+    @property
+    def is_refused(self) -> bool:
+        """Return whether more is asked than some publisher offers, so that it sends nothing."""
+        return self.asked.startswith('reliable') and any('best effort' in o for o in self.offers)
 
     def text(self) -> str:
         """Return one line about the topic."""
@@ -37,7 +44,9 @@ class TopicReport:
             return f'{self.role}: nobody publishes {self.topic}{hint}'
         offered = ', '.join(self.offers)
         if not self.count:
-            return f'{self.role}: {self.topic} is offered by {offered}, but no message arrived'
+            asked = f', asked for as {self.asked}' if self.asked else ''
+            return (f'{self.role}: {self.topic} is offered by {offered}{asked}, but no message '
+                    'arrived')
         stamp = '-' if self.last_stamp_ns is None else f'{self.last_stamp_ns / 1e9:.3f} s'
         return (f'{self.role}: {self.topic} {self.rate_hz:.1f} Hz, {self.count} messages, '
                 f'last stamp {stamp}, offered by {offered}')
@@ -75,6 +84,10 @@ def _cause(reports: Sequence[TopicReport], pairer: FramePairer[ItemT]) -> str:
         example = unpublished[0].others[0] if unpublished[0].others else '/your/topic'
         return (f'{unpublished[0].role} has no publisher; remap it, as in '
                 f'-r {unpublished[0].role}:={example}')
+    refused = [r.role for r in reports if not r.count and r.is_refused]
+    if refused:
+        return (f'{" and ".join(refused)}: reliable is asked of a best-effort publisher, which '
+                'then sends nothing; set input.reliability to auto')
     silent = [r.role for r in reports if not r.count]
     if silent:
         return (f'nothing arrives on {" and ".join(silent)}; check that the driver streams and '

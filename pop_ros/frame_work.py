@@ -164,6 +164,10 @@ class FrameWork:
             return
         reason = drop_reason(error)
         is_fault = not isinstance(error, PopError)
-        if self._statistics.add_refusal(reason, str(error), is_fault=is_fault):
-            say = self._log.error if is_fault else self._log.warning
-            say(f'frame dropped ({reason}): {error}')
+        if not self._statistics.add_refusal(reason, str(error), is_fault=is_fault):
+            return
+        # rclpy refuses a second severity at one place of the code.
+        if is_fault:
+            self._log.error(f'frame failed ({reason}): {error}')
+        else:
+            self._log.warning(f'frame dropped ({reason}): {error}')

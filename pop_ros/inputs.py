@@ -93,8 +93,9 @@ class InputTopic:
         topic, kind, offers = self._published()
         texts = tuple(f'{o.node_name} ({describe_qos(o.qos_profile)})' for o in offers)
         others = () if texts else self._same_type(kind)
+        asked = '' if self._subscribed is None else describe_qos(self._subscribed[1])
         return TopicReport(
-            self.role, topic, texts, self._count, rate_hz, self._last_stamp_ns, others)
+            self.role, topic, texts, self._count, rate_hz, self._last_stamp_ns, others, asked)
 
     def _published(self) -> tuple[str, type, Sequence[TopicEndpointInfo]]:
         """Return the best transport that is published: topic, type and its publishers."""
@@ -108,8 +109,10 @@ class InputTopic:
     def _same_type(self, kind: type) -> tuple[str, ...]:
         name = f'{kind.__module__.split(".")[0]}/msg/{kind.__name__}'
         known = self._node.get_topic_names_and_types()
+        own = f'{self._node.get_fully_qualified_name()}/'
         same = [topic for topic, types in known
-                if name in types and self._node.count_publishers(topic)]
+                if name in types and not topic.startswith(own)
+                and self._node.count_publishers(topic)]
         wants_depth = 'depth' in self.role
         return tuple(sorted(same, key=lambda topic: ('depth' in topic) != wants_depth))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -109,4 +110,10 @@ class Worker(Generic[ItemT]):
                 else:
                     self._process(item)
             except Exception as error:  # noqa: BLE001 - one bad frame must not end the node
-                self._on_error(error)
+                self._tell(error)
+
+    def _tell(self, error: Exception) -> None:
+        try:
+            self._on_error(error)
+        except Exception:  # noqa: BLE001 - nor must a failure to tell of it
+            sys.excepthook(*sys.exc_info())

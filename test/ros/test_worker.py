@@ -2,6 +2,8 @@
 
 import threading
 
+import pytest
+
 from pop_ros.worker import Mailbox, Worker
 
 
@@ -133,3 +135,25 @@ def test_tasks_given_before_the_end_are_done_and_a_waiting_item_is_not() -> None
     threading.Timer(0.05, release.set).start()
     assert worker.stop(5)
     assert done == [1, 'last']
+
+
+def test_a_failure_to_tell_of_an_error_does_not_end_the_work(
+    capsys: pytest.CaptureFixture[str]
+) -> None:
+    done = threading.Event()
+
+    def process(item: int) -> None:
+        if item == 0:
+            raise ValueError('bad frame')
+        done.set()
+
+    def on_error(_error: Exception) -> None:
+        worker.mailbox.put(1)
+        raise OSError('disk full')
+
+    worker = Worker(process, on_error)
+    worker.start()
+    worker.mailbox.put(0)
+    assert done.wait(5)
+    assert worker.stop(5)
+    assert 'disk full' in capsys.readouterr().err
