@@ -60,7 +60,9 @@ def examine() -> Iterator[Finding]:
     yield shared_memory()
     yield profile()
     yield from message_packages()
-    yield caches()
+    yield pose_library()
+    yield kernels()
+    yield networks()
     context = Context()
     rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
     node = Node('pop_doctor', context=context)
@@ -125,8 +127,8 @@ def packages_of_others() -> Finding:
     return Finding('other messages', Verdict.GOOD, text)
 
 
-def caches() -> Finding:
-    """Return whether the pose library and the compiled kernels are there already."""
+def pose_library() -> Finding:
+    """Return whether the pose library has been generated already."""
     from pop_core.retrieval.default_library import cache_folder
 
     folder = cache_folder()
@@ -135,6 +137,34 @@ def caches() -> Finding:
         return Finding('pose library', Verdict.GOOD, f'{found[-1]}')
     return Finding('pose library', Verdict.NOTE, f'none in {folder}',
                    'the first start generates it, which takes about a minute')
+
+
+def kernels() -> Finding:
+    """Return whether numba has compiled the kernels already, and can keep them."""
+    from pop_ros.kernel_cache import look_at_kernels
+
+    cache = look_at_kernels()
+    known = len(cache.cached) + len(cache.missing)
+    text = f'{len(cache.cached)} of {known} modules are in the cache'
+    if not cache.is_writable:
+        return Finding('compiled kernels', Verdict.NOTE, f'{text}, which cannot be written',
+                       'set NUMBA_CACHE_DIR to a folder of yours, or every start compiles them')
+    if cache.missing:
+        return Finding('compiled kernels', Verdict.NOTE, text,
+                       'the first start compiles the others, which takes about a minute')
+    return Finding('compiled kernels', Verdict.GOOD, text)
+
+
+def networks() -> Finding:
+    """Return which networks for keypoints have been fetched."""
+    from pop_ros.network_registry import load_registry, networks_folder
+
+    found = [entry.name for entry in load_registry() if entry.path.is_file()]
+    if found:
+        return Finding('keypoint networks', Verdict.GOOD, ', '.join(found),
+                       f'pop node --keypoints {found[0]}')
+    return Finding('keypoint networks', Verdict.NOTE, f'none in {networks_folder()}',
+                   'pop models list names some; a file of yours does as well, and OpenPose files')
 
 
 def middleware(node: Node, context: Context) -> Finding:

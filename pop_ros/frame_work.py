@@ -50,7 +50,7 @@ class FrameWork:
         self._running = threading.Event()
         self._fitter: FrameFitter | None = None
         self._latest: FittedFrame | None = None
-        self._said_share = 0.0
+        self._said_share = -1.0
         self._worker: Worker[RgbdMessages] = Worker(
             self._fit, self._on_error, lambda: self._prepare(detector, frames))
         self._worker.start()
@@ -117,7 +117,8 @@ class FrameWork:
 
     def _say_progress(self, share: float, sentence: str) -> None:
         self.doing = f'{share:.0%} {sentence}'
-        if share >= self._said_share + PROGRESS_STEP:
+        # A smaller share is that of the next step.
+        if not self._said_share <= share < self._said_share + PROGRESS_STEP:
             self._said_share = share
             self._log.info(self.doing)
 

@@ -32,7 +32,8 @@ def make_pipeline(
         config: Settings; None takes the defaults.
         body_file: Body model (.npz) in place of the default body.
         library_file: Pose library in place of the default one.
-        progress: Called with a share 0..1 and a sentence while a first library is generated.
+        progress: Called with a share 0..1 and a sentence while a first library is generated, and
+            before kernels are compiled for the first time.
 
     Raises:
         PopError: If a file is damaged or not of its format.
@@ -43,6 +44,7 @@ def make_pipeline(
     from pop_core.retrieval.default_library import default_library
     from pop_core.retrieval.library_file import load_library
     from pop_core.retrieval.pose_library import on_body
+    from pop_ros.kernel_cache import look_at_kernels
     from pop_ros.warm_up import warm_up
 
     model = default_body() if body_file is None else load_body_model(body_file)
@@ -50,6 +52,8 @@ def make_pipeline(
     library = default_library(told) if library_file is None else load_library(library_file)
     if body_file is not None:
         library = on_body(library, model)
+    if progress is not None and (missing := look_at_kernels().missing):
+        progress(0.0, f'compiling kernels of {len(missing)} modules: about a minute, once')
     pipeline = BodyPipeline(model, library, detector, config)
     warm_up(pipeline)
     return pipeline

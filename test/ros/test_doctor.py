@@ -1,6 +1,7 @@
 """`pop doctor` finds what is wrong and names the camera it sees."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -34,6 +35,7 @@ def test_the_middleware_works_and_a_known_camera_is_recognised() -> None:
         rclpy.shutdown()
     assert done.returncode == 0, done.stdout + done.stderr
     assert 'ok    middleware: rmw' in done.stdout
+    assert re.search(r'(ok|note)    ?compiled kernels: \d+ of \d+ modules', done.stdout)
     assert f'image topic: {topics.color} (reliable)' in done.stdout
     assert '-> pop node --camera orbbec' in done.stdout
 
@@ -48,6 +50,14 @@ def test_a_profile_that_does_not_exist_is_bad(tmp_path: Path) -> None:
 def test_without_a_cached_library_the_first_start_is_announced(tmp_path: Path) -> None:
     done = run_doctor(XDG_CACHE_HOME=str(tmp_path))
     assert f'note  pose library: none in {tmp_path}' in done.stdout
+
+
+def test_cold_caches_and_missing_networks_are_named_with_what_to_do(tmp_path: Path) -> None:
+    done = run_doctor(XDG_CACHE_HOME=str(tmp_path), NUMBA_CACHE_DIR=str(tmp_path / 'numba'))
+    assert 'note  compiled kernels: 0 of ' in done.stdout
+    assert 'the first start compiles the others' in done.stdout
+    assert f'note  keypoint networks: none in {tmp_path}' in done.stdout
+    assert 'pop models list' in done.stdout
 
 
 def test_an_unknown_camera_is_refused_with_those_that_are_known() -> None:

@@ -145,3 +145,14 @@ def test_a_signal_while_modules_are_imported_ends_the_node_cleanly(
     _, errors = process.communicate(timeout=30)
     assert process.returncode == 0, errors
     assert 'Traceback' not in errors
+
+
+def test_a_start_with_cold_caches_says_what_takes_so_long_and_can_be_ended(
+    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path))
+    running = RunningNode(*flags(recording))
+    running.wait_for('compiling kernels of')
+    assert 'about a minute, once' in running.output
+    assert running.end() == 0, running.output
+    assert 'Traceback' not in running.output
