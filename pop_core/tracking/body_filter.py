@@ -99,7 +99,7 @@ def update(
 
     Args:
         predicted: The belief before.
-        fitted: The fit, already the mean of prediction and measurement.
+        fitted: The fit, already the mean of prediction, measurement and priors.
         information: J'WJ of what was measured, without priors and without the prediction.
     """
     before = inverse(predicted.covariance)
@@ -115,14 +115,16 @@ def update(
 
 
 def with_known_shape(state: FilterState, known: FilterState, model: BodyModel) -> FilterState:
-    """Return a belief of a new pose that also holds what is known of the person's shape."""
+    """Return a belief of a new pose that also holds a person's known shape, and their walk."""
     shape = slice(N_MOVING, None)
     information = np.zeros_like(state.covariance)
     information[shape, shape] = inverse(known.covariance[shape, shape])
     covariance = inverse(inverse(state.covariance) + information)
     step = covariance @ information @ difference(known.parameters, state.parameters)
     parameters = increment(state.parameters, step, pose_skeleton(model, state.parameters))
-    return replace(state, parameters=parameters, covariance=covariance)
+    velocity = np.zeros(N_MOVING)
+    velocity[:3] = known.velocity[:3]
+    return replace(state, parameters=parameters, covariance=covariance, velocity=velocity)
 
 
 def difference(

@@ -20,7 +20,6 @@ from pop_core.tracking.body_filter import (
     first_state,
     inverse,
     predict,
-    update,
     with_known_shape,
 )
 from pop_core.tracking.limbs import contradicted_joints, limb_bones, loosened
@@ -29,13 +28,14 @@ from pop_core.tracking.track import Alternative, PersonTrack
 from pop_core.tracking.track_view import observe_track
 from pop_core.tracking.tracked_energy import prior_curvature
 from pop_core.tracking.tracking_config import TrackingConfig
-from pop_core.tracking.warm_start import WarmFit, WarmStart, sighting
+from pop_core.tracking.warm_start import WarmFit, WarmStart, sighting, updated
 
 MIN_SEEN = 0.04  # share of the body that must be seen for the frame to say anything of it
 CONTRADICTED = 0.4  # a body is not where the camera saw through this share of it
 USUAL_SHARE = 0.05  # how fast the usual E_depth follows
 UNUSUAL, UNUSUAL_M = 1.5, 0.01  # E_depth above this many times the usual and this much more
 TRUSTED_SUPPORT = 0.5
+RESOLVED = 8.0  # cost that a body may be worse by for each joint that agrees with it instead
 
 
 class Follower:
@@ -115,14 +115,16 @@ class Follower:
         self, track: PersonTrack, fit: WarmFit, observation: Observation, lifted: LiftedJoints
     ) -> WarmFit:
         """Look anew for limbs that keypoints contradict; return the better explanation."""
-        loose = limb_bones(contradicted_joints(fit.state, lifted))
+        contradicted = contradicted_joints(fit.state, lifted)
+        loose = limb_bones(contradicted)
         if not loose.any():
             return fit
         free = loosened(track.filter, loose)
         other = self.warm.fit(
             free, observation, self.config.steps, detected=True, loose=loose)
         ours, theirs = costs(self.warm.fitter, [fit, other], observation)
-        if theirs >= ours:
+        resolved = int(contradicted.sum() - contradicted_joints(other.state, lifted).sum())
+        if theirs >= ours + RESOLVED * resolved:
             return fit
         track.filter = free
         return other
@@ -131,7 +133,7 @@ class Follower:
         self, track: PersonTrack, scene: Scene, fit: WarmFit, lifted: LiftedJoints | None
     ) -> BodyEstimate | None:
         """Update a track by a fit and return the person."""
-        track.filter = update(track.filter, fit.state.parameters, fit.curvature.data)
+        track.filter = updated(track.filter, fit)
         hessian = inverse(track.filter.covariance) + fit.curvature.prior
         body = fit.as_body_fit(
             hessian, tuple(other.filter.parameters for other in track.alternatives))

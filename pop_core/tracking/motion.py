@@ -17,7 +17,7 @@ from pop_core.fitting.body_state import GLOBAL_ORIENT, TRANSL
 
 N_MOVING = 3 + 3 * N_JOINTS
 # (standard deviation of the velocity [m/s, rad/s], how long it lasts [s])
-WALK = (1.0, 1.0)
+WALK, RISE = (1.0, 1.0), (0.35, 0.25)  # along the floor, up and down
 TURN = (1.5, 0.5)
 TRUNK = (0.7, 0.3)
 LIMB = (2.5, 0.25)
@@ -54,6 +54,7 @@ def _of_coordinates() -> tuple[Float[np.ndarray, '75'], Float[np.ndarray, '75']]
     """Return speeds and time constants of translation and all rotation increments."""
     table = np.empty((N_MOVING, 2))
     table[TRANSL], table[GLOBAL_ORIENT] = WALK, TURN
+    table[1] = RISE  # y of a camera that looks ahead
     for name, j in JOINT_INDEX.items():
         if name != 'pelvis':
             table[3 + 3 * j: 6 + 3 * j] = OF_JOINT.get(name.split('_')[-1], TRUNK)

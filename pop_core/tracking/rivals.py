@@ -12,10 +12,9 @@ from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.energy import PriorBelief
 from pop_core.fitting.hypotheses import Hypothesis
 from pop_core.fitting.observation import Observation
-from pop_core.tracking.body_filter import update
 from pop_core.tracking.track import Alternative, PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
-from pop_core.tracking.warm_start import WarmFit, WarmStart
+from pop_core.tracking.warm_start import WarmFit, WarmStart, updated
 
 SAME_M = 0.04  # explanations nearer to each other than this, mean over joints, are one
 DECIDED = 40.0  # summed cost that decides between two of them
@@ -59,7 +58,7 @@ def follow_alternatives(
         if other.excess < -BETTER:
             track.filter, winner = other.filter, fit
             continue
-        other.filter = update(other.filter, fit.state.parameters, fit.curvature.data)
+        other.filter = updated(other.filter, fit)
         age_s = (track.now_ns - other.born_ns) * 1e-9
         is_open = other.excess < DECIDED and age_s <= config.undecided_s
         if is_open and distance_m(fit.state, best.state) > SAME_M:

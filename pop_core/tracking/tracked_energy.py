@@ -12,11 +12,7 @@ from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.energy import BodyEnergy, PriorBelief, TermWeights
 from pop_core.fitting.levenberg_marquardt import Residual, assemble
 from pop_core.fitting.observation import Observation
-from pop_core.fitting.priors import (
-    limit_prior_residual,
-    pose_prior_residual,
-    shape_prior_residual,
-)
+from pop_core.fitting.priors import limit_prior_residual, pose_prior_residual
 from pop_core.fitting.residuals import Pairs
 from pop_core.fitting.robust_loss import geman_mcclure_weight
 from pop_core.geometry.rotation import left_jacobian_inverse
@@ -86,7 +82,7 @@ class TrackedEnergy:
             self._prediction.residual(state, jacobian=jacobian)]
 
     def curvature(self, state: BodyState) -> tuple[Curvature, list[Residual]]:
-        """Return J'WJ of measurements and priors, and the blocks they were made of."""
+        """Return what bends the energy at a state, and the blocks it was made of."""
         blocks = self._energy.residuals(state, True)
         size = state.body.size
         return Curvature(
@@ -97,10 +93,10 @@ class TrackedEnergy:
 def prior_curvature(
     state: BodyState, prior: PosePrior, weight: float
 ) -> Float[np.ndarray, 'x x']:
-    """Return J'WJ of what is believed of any body."""
+    """Return J'WJ of what is believed of any pose."""
     blocks = [
         pose_prior_residual(state, prior, weight, jacobian=True),
-        limit_prior_residual(state, jacobian=True), shape_prior_residual(state, jacobian=True)]
+        limit_prior_residual(state, jacobian=True)]
     return assemble(blocks, state.body.size).hessian
 
 

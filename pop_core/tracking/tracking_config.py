@@ -14,7 +14,7 @@ class TrackingConfig:
     enabled: bool = setting(
         True, about='Whether people are followed over time; else each frame stands alone.')
     detect_every: int = setting(
-        5, minimum=1, maximum=1000,
+        3, minimum=1, maximum=1000,
         about='Frames from one look for people to the next while all are followed well.')
     steps: int = setting(
         2, minimum=1, maximum=20,

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float
 from pop_core.body.model import BodyParameters
 from pop_core.fitting.body_fit import BodyFit, BodyFitter
 from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.correspondence import match_points, match_vertices, thin_points
 from pop_core.fitting.depth_consistency import (
     HidingPlaces,
     Sight,
@@ -25,9 +26,9 @@ from pop_core.fitting.levenberg_marquardt import (
     cost_of,
     levenberg_marquardt_step,
 )
-from pop_core.fitting.observation import Observation
+from pop_core.fitting.observation import Observation, sensor_sigma_m
 from pop_core.fitting.residuals import Pairs, join_pairs
-from pop_core.tracking.body_filter import FilterState
+from pop_core.tracking.body_filter import FilterState, update
 from pop_core.tracking.tracked_energy import Curvature, Prediction, TrackedEnergy
 
 # The robust kernel from the first to the last step [m]: a prediction is off by little, unless
@@ -35,7 +36,8 @@ from pop_core.tracking.tracked_energy import Curvature, Prediction, TrackedEnerg
 WIDE_M, WIDEST_M, NARROWEST_M = 0.07, 0.13, 0.03
 SURPRISE_M = 0.12  # keypoints this far from a predicted body need a wide kernel and more steps
 EXTRA_STEPS = 2
-JOINTS_WEIGHT = 0.3  # of keypoints beside a surface that was followed so far
+NOISE_SIGMAS = 1.0  # the kernel is never narrower than the sensor's noise
+JOINTS_WEIGHT = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +89,11 @@ class WarmFit:
             self.energies, runners_up)
 
 
+def updated(predicted: FilterState, fit: WarmFit) -> FilterState:
+    """Return the belief after a fit."""
+    return update(predicted, fit.state.parameters, fit.curvature.data)
+
+
 class WarmStart:
     """Follows bodies of one model from predictions."""
 
@@ -114,8 +121,10 @@ class WarmStart:
             JOINTS_WEIGHT if detected else 0.0, self.fitter.config.prior_weight, 0.0)
         surprised = loose is not None or (
             detected and farthest_joint_m(state, observation) > SURPRISE_M)
-        scales_m = np.geomspace(
-            WIDEST_M if surprised else WIDE_M, NARROWEST_M, steps + EXTRA_STEPS * surprised)
+        scales_m = np.hypot(
+            np.geomspace(
+                WIDEST_M if surprised else WIDE_M, NARROWEST_M, steps + EXTRA_STEPS * surprised),
+            NOISE_SIGMAS * sensor_sigma_m(state.joints[:1, 2]))
         damping = FIRST_DAMPING
         active = np.ones(state.body.size, dtype=bool)
         visibility = see_body(state, observation)
@@ -144,8 +153,12 @@ class WarmStart:
         self, state: BodyState, observation: Observation, visibility: Visibility,
         segment: Bool[np.ndarray, 'h w'], places: HidingPlaces, scale_m: float,
     ) -> Pairs:
-        parts = [self.fitter.steps.surface_pairs(
-            state, observation, visibility, segment, scale_m)]
+        points, labels = thin_points(observation, segment, self.fitter.config.surface_points)
+        # Planes only: a point tied to its nearest vertex holds a body that slides where it is,
+        # and the filter would take that for knowledge.
+        parts = [
+            match_points(state, visibility, points, labels, scale_m),
+            match_vertices(state, visibility, scale_m)]
         if self.fitter.config.free_space:
             parts.append(free_space_pairs(state, visibility, places))
         if observation.ground is not None:
