@@ -179,7 +179,7 @@ def _network(word: str) -> OnnxSource | DepthNetDetector:
         return source_of(OnnxSession(verified_network(entry), name), decoder or entry.decoder)
     path = Path(name)
     if path.suffix != '.onnx' or not path.is_file():
-        why = 'is not there' if not path.is_file() else 'does not end in .onnx'
+        why = 'does not end in .onnx' if path.is_file() else 'is not there'
         raise SourceError(f'keypoints: expected {SOURCES}, found {path}, which {why}')
     session = load_network(path)
     if decoder is None and is_depth_net(session):

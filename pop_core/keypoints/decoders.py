@@ -53,4 +53,4 @@ def choose_decoder(spec: NetworkSpec, name: str | None, where: str) -> NetworkDe
 
 def reason(decoder: NetworkDecoder, spec: NetworkSpec, where: str) -> str:
     """Return a sentence about why a network is read as it is."""
-    return f'{where}: read as {decoder.name}, which expects {decoder.expects}; it has {spec}'
+    return f'{where}: read as {decoder.name}, for it has {spec}'
