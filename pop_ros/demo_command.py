@@ -13,7 +13,7 @@ def demo(
     out: Annotated[Path, typer.Option('--out', help='New folder, or that of an earlier demo.')]
     = Path('demo_output'),
     frames: Annotated[int, typer.Option('--frames', min=1, help='Length of the recording.')] = 16,
-    seed: Annotated[int, typer.Option('--seed', min=0, help='Another person and room.')] = 0,
+    seed: Annotated[int, typer.Option('--seed', min=0, help='Another person and room.')] = 8,
 ) -> None:
     """Synthesise a walk behind a table, play it to the node over DDS, record and show the bodies.
 

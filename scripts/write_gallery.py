@@ -29,8 +29,9 @@ from pop_ros.fit_pictures import energy_chart, measured_surfaces
 from pop_ros.report import Report
 from pop_ros.report3d import SceneFrame
 from pop_ros.sources import make_pipeline
+from scripts.write_pictures import WALK_SEED
 
-WALK_SEED, WALK_FRAMES, RATE_HZ = 0, 12, 8.0
+WALK_FRAMES, RATE_HZ = 12, 8.0
 CROWD_SEED = 6
 JPEG_QUALITY = 78
 CROP = slice(24, 690)  # the page without its margins

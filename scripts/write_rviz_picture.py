@@ -20,9 +20,10 @@ from pop_ros.frame_bag import write_frame_bag
 from pop_ros.node_arguments import SourceArguments
 from pop_ros.replay_session import ReplayRequest, run_replay
 from scripts.ros1_screen import PACKAGES, Ros1Screen, missing_programs, ros1_screen
+from scripts.write_pictures import WALK_SEED
 
 CONFIG = Path(__file__).resolve().parents[1] / 'rviz' / 'pop_ros1.rviz'
-SEED, FRAMES, SHOWN = 0, 16, 8
+FRAMES, SHOWN = 16, 8
 SIZE = (1400, 900)
 NAME = 'rviz.png'
 TOPICS = ('/pop/mesh', '/pop/joints', '/pop/cloud')
@@ -32,7 +33,7 @@ COLORED = 24  # difference of a pixel's channels; background and grid are grey
 
 def fitted_bag(work: Path) -> Path:
     """Write a ROS 1 bag with the bodies of a synthetic frame."""
-    scene = synthesise_sequence(default_body(), SEED, FRAMES, rate_hz=10.0)[SHOWN]
+    scene = synthesise_sequence(default_body(), WALK_SEED, FRAMES, rate_hz=10.0)[SHOWN]
     found = [detection for detection in scene.detections() if detection is not None]
     write_openpose_json(work / f'{scene.frame.stamp_ns}.json', found)
     write_frame_bag(work / 'camera', [scene.frame])
