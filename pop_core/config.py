@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from pop_core.fitting.fitting_config import FittingConfig
+from pop_core.keypoints.fusion import FusionConfig
 from pop_core.keypoints.lifting import LiftingConfig
 from pop_core.keypoints.people_selection import PeopleConfig
 from pop_core.keypoints.region import RegionConfig
@@ -35,6 +36,7 @@ class PipelineConfig:
         True, about='Whether the floor is looked for: feet stand on it and never below it.')
     region: RegionConfig = field(default_factory=RegionConfig)
     people: PeopleConfig = field(default_factory=PeopleConfig)
+    fusion: FusionConfig = field(default_factory=FusionConfig)
     lifting: LiftingConfig = field(default_factory=LiftingConfig)
     retrieval: RetrievalConfig = field(default_factory=RetrievalConfig)
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)

@@ -71,7 +71,7 @@ def fit(
     from pop_ros.sources import make_pipeline
 
     config = with_flags(PipelineConfig(), settings or [])
-    source = FrameKeypoints(','.join(keypoints or []) or None, decoder, config.people)
+    source = FrameKeypoints(','.join(keypoints or []) or None, decoder, config)
     for reason in source.reasons:
         typer.echo(reason, err=True)
     frames, bad = _collect(inputs)

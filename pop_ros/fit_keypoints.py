@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pop_ros.keypoint_sources import SOURCES, SourceError, keep_people, make_detector, reasons
+from pop_ros.keypoint_sources import SOURCES, SourceError, apply_settings, make_detector, reasons
 
 if TYPE_CHECKING:
+    from pop_core.config import PipelineConfig
     from pop_core.keypoints.detection import Detection, KeypointDetector
-    from pop_core.keypoints.people_selection import PeopleConfig
     from pop_core.rgbd import RgbdFrame
     from pop_ros.frame_folder import FrameFolder
 
@@ -17,7 +17,7 @@ class FrameKeypoints:
     """A keypoint source that is told which folder the next frame comes from."""
 
     def __init__(
-        self, source: str | None, decoder: str | None, people: PeopleConfig | None = None
+        self, source: str | None, decoder: str | None, config: PipelineConfig | None = None
     ) -> None:
         """Take what the user said; None means each frame's file.
 
@@ -28,8 +28,8 @@ class FrameKeypoints:
         self._source: KeypointDetector = self._file
         if source is not None:
             self._source = make_detector(source, decoder=decoder, json_source=self._file)
-            if people is not None:
-                keep_people(self._source, people)
+            if config is not None:
+                apply_settings(self._source, config)
 
     @property
     def reasons(self) -> list[str]:

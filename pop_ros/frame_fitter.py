@@ -1,4 +1,4 @@
-"""From the messages of one frame to the messages of its bodies."""
+"""From the messages of the next frame to the messages of its bodies."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from pop_core.estimate import FrameResult
 from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.pipeline import BodyPipeline
 from pop_core.rgbd import RgbdFrame
+from pop_core.tracking.tracker import BodyTracker
 from pop_ros.body_messages import RECORDED_TYPES, BodyMessages, Output
 from pop_ros.frame_maker import FrameMaker
-from pop_ros.keypoint_sources import keep_people
+from pop_ros.keypoint_sources import apply_settings
 from pop_ros.node_config import NodeConfig
 from pop_ros.sources import make_pipeline
 from pop_ros.static_frames import StaticFrames, parse_extrinsics
@@ -36,7 +37,7 @@ class FittedFrame:
 
 
 class FrameFitter:
-    """A pipeline with ROS messages on both sides."""
+    """A pipeline that follows people, with ROS messages on both sides."""
 
     def __init__(
         self,
@@ -54,8 +55,9 @@ class FrameFitter:
         Raises:
             PopError: If one of them cannot be loaded.
         """
-        keep_people(detector, pipeline_config.people)
+        apply_settings(detector, pipeline_config)
         self._pipeline = make_pipeline(detector, pipeline_config, progress=progress)
+        self._tracker = BodyTracker(self._pipeline, config.tracking)
         self._messages = BodyMessages(self._pipeline.model, config)
         self._maker = FrameMaker(frames or StaticFrames())
         self._maker.extrinsics = parse_extrinsics(config.depth.extrinsics)
@@ -68,14 +70,16 @@ class FrameFitter:
     def configure(self, pipeline_config: PipelineConfig, config: NodeConfig) -> None:
         """Take over changed settings; model, library and keypoint source stay loaded."""
         old = self._pipeline
-        keep_people(old.detector, pipeline_config.people)
+        apply_settings(old.detector, pipeline_config)
         self._pipeline = BodyPipeline(
             old.model, old.library, old.detector, pipeline_config, old.fitter.prior)
+        self._tracker.configure(self._pipeline, config.tracking)
         self._messages.configure(config)
         self._maker.extrinsics = parse_extrinsics(config.depth.extrinsics)
 
     def reset(self) -> None:
         """Start the ids of people anew."""
+        self._tracker.reset()
         self._messages.reset()
 
     def clear(self, wanted: Collection[str]) -> list[Output]:
@@ -101,6 +105,7 @@ class FrameFitter:
             PopError: If the keypoint source cannot read what it needs for this frame.
         """
         frame = self._maker.make(color, depth, info, depth_info)
-        result = self._pipeline.process(frame)
+        tracked = self._tracker.config.enabled
+        result = (self._tracker if tracked else self._pipeline).process(frame)
         outputs = self._messages.build(result, frame, color.header.frame_id, wanted)
         return FittedFrame(frame, result, outputs)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pop_core.errors import PopError
 
 if TYPE_CHECKING:
+    from pop_core.config import PipelineConfig
     from pop_core.keypoints.boxes import BoxDetector, TopDownDetector
     from pop_core.keypoints.depth_net import DepthNetDetector
     from pop_core.keypoints.detection import KeypointDetector
@@ -77,6 +78,15 @@ def keep_people(detector: object, config: PeopleConfig) -> None:
     for part in _parts(detector):
         if isinstance(part, OnnxKeypointDetector | OnnxTopDownDetector):
             part.config = config
+
+
+def apply_settings(detector: object, config: PipelineConfig) -> None:
+    """Tell a source the settings of people.* and fusion.*."""
+    from pop_core.keypoints.fusion import FusedDetector
+
+    keep_people(detector, config.people)
+    if isinstance(detector, FusedDetector):
+        detector.config = config.fusion
 
 
 def _parts(detector: object) -> Sequence[Any]:

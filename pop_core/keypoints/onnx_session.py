@@ -11,6 +11,7 @@ import math
 import stat
 from collections.abc import Sequence
 from pathlib import Path
+from threading import Timer
 
 import numpy as np
 import onnxruntime
@@ -21,6 +22,7 @@ from pop_core.keypoints.network import NetworkSpec, Tensor, TensorSpec
 THREADS = 2
 LARGEST_FILE = 2**31 - 1  # bytes; a protobuf cannot be larger
 LARGEST_TENSOR = 2**27  # elements: 512 MB of float32
+LONGEST_S = 60.0
 FOLDING_BYTES = 2**26
 DTYPES = {
     'tensor(uint8)': 'uint8', 'tensor(int32)': 'int32', 'tensor(float)': 'float32',
@@ -34,18 +36,20 @@ PROVIDERS = ('CUDAExecutionProvider', 'CPUExecutionProvider')
 class OnnxSession:
     """A loaded network."""
 
-    def __init__(self, content: bytes, where: str) -> None:
+    def __init__(self, content: bytes, where: str, longest_s: float = LONGEST_S) -> None:
         """Load a network.
 
         Args:
             content: What the .onnx file holds.
             where: Name of the file, for messages.
+            longest_s: A run that takes longer is ended [s]; a network may hold an endless loop.
 
         Raises:
             NetworkShapeError: If it is no network, needs other files or unknown operators, or
                 declares tensors of impossible sizes.
         """
         self.where = where
+        self.longest_s = longest_s
         self._session = _load(content, where)
         self.spec = _spec(self._session)
         self.facts = dict(self._session.get_modelmeta().custom_metadata_map)
@@ -64,11 +68,18 @@ class OnnxSession:
         entry = self.spec.inputs[0]
         if entry.dtype in FLOATS:
             tensor = tensor.astype(entry.dtype, copy=False)
+        options = onnxruntime.RunOptions()
+        alarm = Timer(self.longest_s, setattr, (options, 'terminate', True))
+        alarm.daemon = True
+        alarm.start()
         try:
-            outputs = self._session.run(None, {entry.name: tensor})
+            outputs = self._session.run(None, {entry.name: tensor}, options)
         except Exception as error:  # noqa: BLE001 - ONNX Runtime's errors share no public base
             raise NetworkShapeError(
-                f'{self.where}: expected outputs, found: {_one_line(error)}') from None
+                f'{self.where}: expected outputs within {self.longest_s:.0f} s, found: '
+                f'{_one_line(error)}') from None
+        finally:
+            alarm.cancel()
         arrays = [np.asarray(output) for output in outputs]
         for declared, array in zip(self.spec.outputs, arrays, strict=True):
             _check_shape(declared, array, self.where)

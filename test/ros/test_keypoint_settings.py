@@ -6,6 +6,7 @@ import numpy as np
 from support.onnx_files import save_network
 
 from pop_core.config import PipelineConfig
+from pop_core.keypoints.fusion import FusionConfig
 from pop_core.keypoints.people_selection import PeopleConfig
 from pop_ros.frame_fitter import FrameFitter
 from pop_ros.keypoint_sources import keep_people, make_detector
@@ -29,6 +30,15 @@ def test_one_network_and_each_of_several_keep_the_people_they_are_told_to(
         keep_people(detector, STRICT)
     assert one.config is STRICT
     assert [part.config for part in several.people] == [STRICT, STRICT]
+
+
+def test_settings_of_fusion_reach_the_source_that_merges(tmp_path: Path) -> None:
+    merged = make_detector(f'{yolo(tmp_path / "a.onnx")},{yolo(tmp_path / "b.onnx")}')
+    fusion = FusionConfig(same_person=0.6)
+    fitter = FrameFitter(merged, PipelineConfig(fusion=fusion), NodeConfig())
+    assert merged.config is fusion
+    fitter.configure(PipelineConfig(), NodeConfig())
+    assert merged.config.same_person == FusionConfig().same_person
 
 
 def test_the_node_s_settings_reach_the_network_at_start_and_later(tmp_path: Path) -> None:

@@ -133,6 +133,23 @@ def test_a_network_that_fails_on_its_input_is_told(tmp_path):
     fails(path, np.zeros((1, 3, 9, 9), np.float32))
 
 
+def test_an_endless_network_is_ended(tmp_path):
+    """A loop of 2^60 rounds, each of which adds one."""
+    body = helper.make_graph(
+        [helper.make_node('Identity', ['go'], ['go_on']),
+         helper.make_node('Add', ['before', 'one'], ['after'])], 'body',
+        [helper.make_tensor_value_info('round', KINDS['int64'], ()),
+         helper.make_tensor_value_info('go', onnx.TensorProto.BOOL, ()), info('before')],
+        [helper.make_tensor_value_info('go_on', onnx.TensorProto.BOOL, ()), info('after')])
+    nodes = [constant('rounds', np.array(2**60, np.int64)), constant('start', np.array(True)),
+             constant('one', np.ones(SMALL, np.float32)),
+             helper.make_node('Loop', ['rounds', 'start', 'image'], ['out'], body=body)]
+    path = save_graph(tmp_path / 'n.onnx', nodes, [info('out')], SMALL)
+    session = OnnxSession(path.read_bytes(), str(path), longest_s=0.5)
+    with pytest.raises(NetworkShapeError, match='expected outputs within'):
+        session.run(np.zeros(SMALL, np.float32))
+
+
 @pytest.mark.parametrize('content', [b'', b'no network', bytes(range(256)) * 40, b'\x08' * 10**6])
 def test_bytes_that_are_no_network_are_told(tmp_path, content):
     (tmp_path / 'n.onnx').write_bytes(content)
