@@ -5,6 +5,7 @@ import re
 import yaml
 from support.node import ROOT
 
+from pop_core.config import PipelineConfig
 from pop_core.settings import list_settings
 from pop_ros.body_messages import OUTPUT_TYPES
 from pop_ros.camera_presets import CAMERA_PRESETS
@@ -59,3 +60,18 @@ def test_rviz_configurations_show_what_is_published() -> None:
         text = (ROOT / 'rviz' / name).read_text(encoding='utf-8')
         assert yaml.safe_load(text)['Visualization Manager']['Displays']
         assert set(re.findall(r'/pop/(\w+)', text)) <= set(OUTPUT_TYPES)
+
+
+def test_the_camera_tutorial_lists_every_camera_and_what_to_switch_on() -> None:
+    page = (ROOT / 'docs' / 'camera.md').read_text(encoding='utf-8')
+    rows = re.findall(r'^\| `(\w+)` \| ([^|]+) \| ([^|]+) \|$', page, re.MULTILINE)
+    assert rows == [(name, p.driver, p.hint) for name, p in CAMERA_PRESETS.items()]
+
+
+def test_the_camera_tutorial_names_parameters_that_exist() -> None:
+    page = (ROOT / 'docs' / 'camera.md').read_text(encoding='utf-8')
+    known = {item.name for config in (NodeConfig(), PipelineConfig())
+             for item in list_settings(config)}
+    named = set(re.findall(r'`((?:region|diagnostics|tf|mesh|sync)\.\w+)', page))
+    assert named
+    assert named <= known
