@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
-import numpy as np
 from geometry_msgs.msg import PoseArray
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import Header
@@ -72,7 +71,7 @@ class BodyMessages:
         empty set of joints and points. Only the overlay, a picture, comes with every frame.
         """
         bodies = result.bodies
-        ids = self._ids.assign(np.array([b.joints[0] for b in bodies]).reshape(-1, 3))
+        ids = self._ids.of(bodies)
         self._latest = frame, frame_id
         header = to_messages.make_header(frame.stamp_ns, frame_id)
         picture = [(OVERLAY, self._overlay(result, frame, header))] if OVERLAY in wanted else []

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from pop_core.errors import SettingError
 from pop_core.settings import setting
+from pop_core.tracking.tracking_config import TrackingConfig
 from pop_ros.static_frames import parse_extrinsics
 
 RELIABILITIES = ('auto', 'reliable', 'best_effort')
@@ -97,6 +98,7 @@ class NodeConfig:
     tf: TfConfig = field(default_factory=TfConfig)
     snapshot: SnapshotConfig = field(default_factory=SnapshotConfig)
     diagnostics: DiagnosticsConfig = field(default_factory=DiagnosticsConfig)
+    tracking: TrackingConfig = field(default_factory=TrackingConfig)
     rep155: bool = setting(
         False, about='Publish people below /humans/bodies too (REP-155); needs hri_msgs.')
     autostart: bool = setting(

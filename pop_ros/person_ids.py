@@ -1,10 +1,14 @@
-"""Keep one id per person from frame to frame by the nearest pelvis."""
+"""One id per person: the track's, or where nobody is tracked, that of the nearest pelvis."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
 from scipy.optimize import linear_sum_assignment
+
+from pop_core.estimate import BodyEstimate
 
 MAX_STEP_M = 0.6  # a walking person between two frames of a slow pipeline
 
@@ -16,6 +20,13 @@ class PersonIds:
         self._ids: list[int] = []
         self._pelvis: Float[np.ndarray, 'n 3'] = np.zeros((0, 3))
         self._next_id = 0
+
+    def of(self, bodies: Sequence[BodyEstimate]) -> list[int]:
+        """Return the id of each body of the next frame."""
+        tracks = [body.track for body in bodies if body.track is not None]
+        if bodies and len(tracks) == len(bodies):
+            return [track.id for track in tracks]
+        return self.assign(np.array([body.joints[0] for body in bodies]).reshape(-1, 3))
 
     def assign(self, pelvis: Float[np.ndarray, 'n 3']) -> list[int]:
         """Return an id for each pelvis [m], keeping those of the latest frame where near."""

@@ -17,6 +17,7 @@ from pop_core.pipeline import BodyPipeline, PersonFit, Scene
 from pop_core.tracking.association import Expected
 from pop_core.tracking.body_filter import (
     FilterState,
+    difference,
     first_state,
     inverse,
     predict,
@@ -139,6 +140,7 @@ class Follower:
             hessian, tuple(other.filter.parameters for other in track.alternatives))
         if lifted is not None:
             track.trust = plausibility(body, lifted)
+        body = self._smoothed(track, body)
         estimate, support = self.pipeline.estimate(scene, body, track.trust)
         self._judge(track, fit, support, lifted)
         track.note_seen(estimate, self.config)
@@ -146,6 +148,15 @@ class Follower:
             track.note_unseen(False, self.config)
             return None
         return replace(estimate, track=track.tag())
+
+    def _smoothed(self, track: PersonTrack, body: BodyFit) -> BodyFit:
+        """Return a body moved back toward the last one that was given out."""
+        if self.config.smoothing > 0.0 and track.shown is not None:
+            back = -self.config.smoothing * difference(body.parameters, track.shown)
+            coarse = body.coarse.moved(back)
+            body = replace(body, parameters=coarse.parameters, coarse=coarse)
+        track.shown = body.parameters
+        return body
 
     def _judge(
         self, track: PersonTrack, fit: WarmFit, support: float, lifted: LiftedJoints | None

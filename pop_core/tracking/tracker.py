@@ -32,15 +32,18 @@ class BodyTracker:
 
     def __init__(self, pipeline: BodyPipeline, config: TrackingConfig | None = None) -> None:
         """Prepare to follow people with a pipeline's model, detector and settings."""
-        self.pipeline = pipeline
-        self.config = config or TrackingConfig()
-        self._follower, self._finder = Follower(pipeline, self.config), Finder(pipeline)
         self._blas = ThreadpoolController()
         self._next_id = 0
         self._tracks: list[PersonTrack] = []
         self._last: tuple[Camera, int] | None = None
         self._ground: Ground | None = None
-        self._schedule = DetectionSchedule(self.config)
+        self.configure(pipeline, config or TrackingConfig())
+
+    def configure(self, pipeline: BodyPipeline, config: TrackingConfig) -> None:
+        """Take over other settings, or a pipeline of the same body model; people stay known."""
+        self.pipeline, self.config = pipeline, config
+        self._follower, self._finder = Follower(pipeline, config), Finder(pipeline)
+        self._schedule = DetectionSchedule(config)
 
     def reset(self) -> None:
         """Forget everybody and count ids from 0 again."""
