@@ -41,8 +41,8 @@ KIND, FORMAT = 'pop_depth_net', '1'
 OUTPUTS = (('parts', N_CLASSES), ('votes', 45), ('log_sigma', 15), ('visible', 15))
 EXPECTED = ('a depth network of this package: depth_m (1, 1, ?, ?) float32 -> '
             + ', '.join(f'{name} (1, {channels}, ?, ?)' for name, channels in OUTPUTS))
-GOOD_M = 0.10  # a keypoint's score is the chance that it is nearer than this
 FEWEST_CELLS = 4
+SUREST = 8  # joints; those that are hidden or out of the image make nobody less real
 FOCAL_PX = (40.0, 1000.0)  # no network of this kind looks finer or coarser
 
 
@@ -128,17 +128,19 @@ def decode(
         return []
     z = nearest[row, column].astype(np.float64)
     cells = Cells(
-        row, column, z, probability[row, column].astype(np.float64),
+        row, column, z, (z * STRIDE / view.camera.fx) ** 2,
+        probability[row, column].astype(np.float64),
         read_votes(votes, row, column, z, view.camera),
         np.exp(log_sigma[:, row, column].T.astype(np.float64)),
         1.0 / (1.0 + np.exp(-visible[:, row, column].T.astype(np.float64))))
-    member = group_cells(cells, (z * STRIDE / view.camera.fx) ** 2, config)
+    member = group_cells(cells, config)
     people = [fuse_votes(cells.chosen(member == k)) for k in range(member.max() + 1)]
     owner = np.full((rows, columns), -1, dtype=np.int64)
     owner[row, column] = member
     part = 1 + parts[1:].argmax(axis=0)
     pixels = label_pixels(frame.depth_m, view, owner, part, nearest)
-    found = [_detection(person, k, pixels, frame.camera) for k, person in enumerate(people)]
+    found = [_detection(person, k, pixels, frame.camera) for k, person in enumerate(people)
+             if person_score(person) >= config.min_person_score]
     return sorted((d for d in found if d is not None), key=lambda d: -d.score)
 
 
@@ -147,6 +149,11 @@ def cell_depth(depth_m: Float32[np.ndarray, 'h w']) -> Float32[np.ndarray, 'h4 w
     h, w = depth_m.shape
     filled = np.where(depth_m > 0, depth_m, np.float32(np.inf))
     return filled.reshape(h // STRIDE, STRIDE, w // STRIDE, STRIDE).min(axis=(1, 3))
+
+
+def person_score(person: VotedPerson) -> float:
+    """Return a score 0..1: that there is a person, and that the surer half of joints is right."""
+    return person.existence * float(np.sort(person.certainty)[-SUREST:].mean())
 
 
 def _detection(
@@ -162,10 +169,9 @@ def _detection(
     left, top, width, height = cv2.boundingRect(mask.view(np.uint8))
     if width == 0 or not inside.any():
         return None
-    certain = 1.0 - np.exp(-GOOD_M / person.sigma_m)
     return Detection(
         keypoints_px=np.where(inside[:, None], uv, np.nan),
-        scores=np.where(inside, certain * person.probability, 0.0),
+        scores=np.where(inside, person.certainty * person.existence, 0.0),
         box_px=np.array([left, top, left + width - 1, top + height - 1], dtype=np.float64),
         joint_depth_m=np.where(inside, person.joints[:, 2], np.nan),
         joint_sigma_m=np.where(inside, np.sqrt(2.0) * person.sigma_m, np.nan),

@@ -7,6 +7,7 @@ place, however much they overlap in the image.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,8 @@ MOST_CELLS = 700  # of a trunk's search; more are thinned out
 NEAREST_M = 0.15   # votes before this have no pixel
 HUBER_M = 0.10
 ROUNDS = 3
+GOOD_M = 0.10  # a keypoint's score is the chance that it is nearer than this
+DOUBTED_M2 = 0.12  # surface of which false people show less, true ones more
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +39,9 @@ class DepthNetConfig:
     min_area_m2: float = setting(
         0.03, unit='m^2', minimum=0.0, maximum=1.0,
         about='Smallest visible surface, as seen from the camera, that makes a person.')
+    min_person_score: float = setting(
+        0.25, minimum=0.0, maximum=1.0,
+        about='Smallest score of a person: that of the surface seen and of the surest joints.')
     trunk_gap_m: float = setting(
         0.30, unit='m', minimum=0.05, maximum=1.0,
         about='Two trunks nearer to each other than this are the same person.')
@@ -52,6 +58,7 @@ class Cells:
         row: Row of the output.
         column: Column of the output.
         depth_m: Nearest depth of the cell [m].
+        area_m2: Surface that the cell shows, as seen from the camera [m^2].
         probability: That the cell shows a person.
         joints: Where each joint of its person is, camera frame [m].
         sigma_m: Laplace scale of each [m].
@@ -61,6 +68,7 @@ class Cells:
     row: Int[np.ndarray, 'n']
     column: Int[np.ndarray, 'n']
     depth_m: Float[np.ndarray, 'n']
+    area_m2: Float[np.ndarray, 'n']
     probability: Float[np.ndarray, 'n']
     joints: Float[np.ndarray, 'n 15 3']
     sigma_m: Float[np.ndarray, 'n 15']
@@ -79,13 +87,25 @@ class VotedPerson:
         joints: The 15 shared joints, camera frame [m].
         sigma_m: Laplace scale of each along one axis [m].
         visible: Probability that the camera sees each.
-        probability: Mean probability of the person's cells.
+        probability: Mean probability that the person's cells show a person.
+        area_m2: Surface seen [m^2].
     """
 
     joints: Float[np.ndarray, '15 3']
     sigma_m: Float[np.ndarray, '15']
     visible: Float[np.ndarray, '15']
     probability: float
+    area_m2: float
+
+    @property
+    def existence(self) -> float:
+        """Return a score 0..1 of there being a person: false ones are small and doubtful."""
+        return self.probability * (1.0 - math.exp(-self.area_m2 / DOUBTED_M2))
+
+    @property
+    def certainty(self) -> Float[np.ndarray, '15']:
+        """Return the chance that each joint is nearer than 10 cm, along each axis."""
+        return np.asarray(1.0 - np.exp(-GOOD_M / self.sigma_m))
 
 
 def read_votes(
@@ -113,18 +133,15 @@ def read_votes(
     return np.concatenate([xy, z[..., None]], axis=2)
 
 
-def group_cells(
-    cells: Cells, area_m2: Float[np.ndarray, 'n'], config: DepthNetConfig
-) -> Int[np.ndarray, 'n']:
+def group_cells(cells: Cells, config: DepthNetConfig) -> Int[np.ndarray, 'n']:
     """Return the person of each cell, the largest first; -1 for cells that belong to nobody.
 
     Args:
         cells: Cells that show people.
-        area_m2: Surface that each shows, as seen from the camera [m^2].
         config: Settings.
     """
     trunk = _trunks(cells)
-    mass = cells.probability * area_m2
+    mass = cells.probability * cells.area_m2
     centres = _modes(trunk, mass, config.trunk_gap_m)
     owner = np.full(len(trunk), -1, dtype=np.int64)
     if len(centres) == 0:
@@ -155,7 +172,8 @@ def fuse_votes(cells: Cells) -> VotedPerson:
     total = robust.sum(axis=0)
     sigma = (robust * cells.sigma_m).sum(axis=0) / total
     visible = (robust * cells.visible).sum(axis=0) / total
-    return VotedPerson(mean, sigma, visible, float(cells.probability.mean()))
+    return VotedPerson(
+        mean, sigma, visible, float(cells.probability.mean()), float(cells.area_m2.sum()))
 
 
 def _weighted_mean(

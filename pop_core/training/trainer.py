@@ -40,10 +40,10 @@ class TrainConfig:
 
     batch: int = 32
     rate: float = 2e-3
-    matrix_rate: float = 0.02
+    matrix_rate: float = 0.006
     decay: float = 0.02
     warm_up: int = 200
-    average: float = 0.998
+    average: float = 0.99
     curriculum: int = 10_000
     first_hidden: float = 0.3
     clip: float = 5.0
@@ -112,11 +112,13 @@ class Trainer:
     @torch.no_grad()
     def _average(self) -> None:
         keep = min(self.config.average, (1 + self.steps) / (10 + self.steps))
-        pairs = zip(self.averaged.parameters(), self.network.parameters(), strict=True)
-        for average, current in pairs:
-            average.lerp_(current, 1.0 - keep)
-        for kept, buffer in zip(self.averaged.buffers(), self.network.buffers(), strict=True):
-            kept.copy_(buffer)
+        current = self.network.state_dict()
+        for name, average in self.averaged.state_dict().items():
+            # Statistics of norms are averaged too: today's do not fit yesterday's weights.
+            if average.is_floating_point():
+                average.lerp_(current[name], 1.0 - keep)
+            else:
+                average.copy_(current[name])
 
     def save(self, path: Path) -> None:
         """Write everything that a later run needs to go on."""

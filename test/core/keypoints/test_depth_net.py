@@ -85,32 +85,32 @@ def test_an_empty_image_shows_nobody(scenes):
     assert detections(empty) == []
 
 
-def two_trunks(gap_m, rng):
+def two_trunks(gap_m, rng, area_m2=1e-3):
     """Return cells of two equal people beside each other, votes with a centimetre of noise."""
     body = rng.normal(0, 0.3, (15, 3)) + [0, 0, 3.0]
     centres = np.repeat([[0.0, 0, 0], [gap_m, 0, 0]], 60, axis=0)
     joints = body + centres[:, None] + rng.normal(0, 0.01, (120, 15, 3))
     ones = np.ones((120, 15))
-    return Cells(np.arange(120), np.arange(120), np.full(120, 2.9), np.full(120, 0.9), joints,
-                 0.03 * ones, 0.5 * ones)
+    return Cells(np.arange(120), np.arange(120), np.full(120, 2.9), np.full(120, area_m2),
+                 np.full(120, 0.9), joints, 0.03 * ones, 0.5 * ones)
 
 
 @pytest.mark.parametrize('gap_m', [0.45, 0.6, 1.0])
 def test_trunks_apart_are_two_people(gap_m):
     cells = two_trunks(gap_m, np.random.default_rng(0))
-    member = group_cells(cells, np.full(120, 1e-3), DepthNetConfig())
+    member = group_cells(cells, DepthNetConfig())
     assert set(member[:60]) != set(member[60:])
     assert member.max() == 1
 
 
 def test_trunks_in_one_place_are_one_person():
     cells = two_trunks(0.05, np.random.default_rng(0))
-    assert group_cells(cells, np.full(120, 1e-3), DepthNetConfig()).tolist() == [0] * 120
+    assert group_cells(cells, DepthNetConfig()).tolist() == [0] * 120
 
 
 def test_a_speck_is_nobody():
-    cells = two_trunks(1.0, np.random.default_rng(0))
-    member = group_cells(cells, np.full(120, 1e-5), DepthNetConfig())
+    cells = two_trunks(1.0, np.random.default_rng(0), area_m2=1e-5)
+    member = group_cells(cells, DepthNetConfig())
     assert member.tolist() == [-1] * 120
 
 
