@@ -21,10 +21,11 @@ from typing import Any
 
 import numpy as np
 import rclpy
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+from sensor_msgs.msg import Image
 
 from benchmarks.node_camera import FRAME_ID, KINDS, as_messages
 from benchmarks.node_live import measure_latency, soak
@@ -128,6 +129,7 @@ def measure_inputs(frame: RgbdFrame) -> Rows:
     """Return the time to pair and to decode one pair of images."""
     messages = as_messages(frame)
     color, depth, info = messages[COLOR], messages[DEPTH], messages[INFO]
+    data = bytes(serialize_message(color)), bytes(serialize_message(depth))
     pairer: FramePairer[Any] = FramePairer(30_000_000)
     stamps = iter(range(0, 10**12, 33_333_333))
 
@@ -136,7 +138,12 @@ def measure_inputs(frame: RgbdFrame) -> Rows:
         pairer.add_color(stamp, color, stamp)
         pairer.add_depth(stamp, depth, stamp)
 
+    def deserialise() -> None:
+        for serialised in data:
+            deserialize_message(serialised, Image)
+
     return [
+        {'step': 'deserialise both images', 'time [ms]': milliseconds(deserialise)},
         {'step': 'pair', 'time [ms]': milliseconds(pair)},
         {'step': 'decode rgb8 and 16UC1',
          'time [ms]': milliseconds(lambda: frame_from_messages(color, depth, info))},

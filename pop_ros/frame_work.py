@@ -98,6 +98,8 @@ class FrameWork:
     def stop(self, timeout_s: float) -> bool:
         """End the thread; return whether the frame in work was finished in time."""
         self.run(False)
+        if self._worker.mailbox.clear():
+            self._statistics.add_drop(STOPPED)
         return self._worker.stop(timeout_s)
 
     # Worker thread

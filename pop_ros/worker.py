@@ -36,6 +36,12 @@ class Mailbox(Generic[ItemT]):
             self._condition.notify()
             return replaced
 
+    def clear(self) -> bool:
+        """Drop the item that waits; return whether there was one."""
+        with self._condition:
+            waited, self._item = self._item is not None, None
+            return waited
+
     def add(self, task: Task) -> None:
         """Queue a task."""
         with self._condition:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import PoseArray
 from lifecycle_msgs.srv import ChangeState, GetState
+from rclpy.qos import ReliabilityPolicy, qos_profile_sensor_data
 from std_srvs.srv import SetBool, Trigger
 from support.node import ROOT, RunningNode
 from support.player import Player
@@ -74,9 +75,32 @@ def test_a_manager_takes_the_node_through_its_life(recording: Recording) -> None
         fit_one(player, recording)
         assert change(player, 'shutdown')
         assert state(player) == 'finalized'
+        assert player.spin_until(lambda: player.received['mesh'][-1].action == Marker.DELETE)
         assert player.spin_until(lambda: not player.is_heard())
     assert running.end(signal.SIGTERM) == 0, running.output
     assert 'Traceback' not in running.output
+
+
+def test_without_subscribers_the_camera_is_left_alone_and_qos_is_the_user_s(
+    recording: Recording
+) -> None:
+    running = RunningNode(
+        *flags(recording), '--ros-args', '-p',
+        'qos_overrides./pop/joints.publisher.reliability:=best_effort')
+    with Player() as player:
+        running.wait_for('ready after')
+        assert not player.spin_until(player.is_heard, 1.0)
+        heard: list[PoseArray] = []
+        listener = player.node.create_subscription(
+            PoseArray, '/pop/joints', heard.append, qos_profile_sensor_data)
+        assert player.spin_until(player.is_heard)
+        player.play(recording.scenes[0].frame)
+        assert player.spin_until(lambda: heard)
+        offer, = player.node.get_publishers_info_by_topic('/pop/joints')
+        assert offer.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+        player.node.destroy_subscription(listener)
+        assert player.spin_until(lambda: not player.is_heard())
+    assert running.end() == 0
 
 
 def test_configuring_without_keypoints_fails_with_a_sentence_and_the_node_stays() -> None:

@@ -14,6 +14,14 @@ def test_a_newer_item_replaces_one_that_waits_and_says_so() -> None:
     assert not mailbox.put(4)
 
 
+def test_clearing_drops_what_waits_and_says_whether_there_was_anything() -> None:
+    mailbox: Mailbox[int] = Mailbox()
+    mailbox.put(1)
+    assert mailbox.clear()
+    assert not mailbox.clear()
+    assert not mailbox.put(2)
+
+
 def test_a_busy_worker_skips_to_the_newest_item() -> None:
     seen: list[int] = []
     entered, release, done = threading.Event(), threading.Event(), threading.Event()
