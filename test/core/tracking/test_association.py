@@ -1,0 +1,85 @@
+"""Who is who: distance, pixels and size decide together, and nobody is taken twice."""
+
+import numpy as np
+import pytest
+from support.one_person import CAMERA, lift_truth
+
+from pop_core.body.kinematics import attached_positions
+from pop_core.body.model import BodyModel, BodyParameters, shared_points
+from pop_core.keypoints.detection import Detection
+from pop_core.keypoints.lifted_joints import LiftedJoints
+from pop_core.tracking.association import Expected, associate, log_size
+
+GATE_M = 0.35
+NOWHERE = np.zeros((CAMERA.height, CAMERA.width), dtype=bool)
+
+
+def shifted(person: BodyParameters, x_m: float) -> BodyParameters:
+    return person.replaced(transl=person.transl + [x_m, 0.0, 0.0])
+
+
+def expected(
+    body: BodyModel, person: BodyParameters, x_m: float, doubt_m: float = 0.01,
+    mask: np.ndarray = NOWHERE,
+) -> Expected:
+    points = attached_positions(shared_points(body), body, shifted(person, x_m))
+    return Expected(points, doubt_m, mask)
+
+
+def seen(body: BodyModel, person: BodyParameters, x_m: float) -> tuple[Detection, LiftedJoints]:
+    lifted = lift_truth(body, shifted(person, x_m))
+    return Detection(lifted.keypoints_px, lifted.scores, np.zeros(4)), lifted
+
+
+def matches(people: list[Expected], found: list[tuple[Detection, LiftedJoints]]) -> dict[int, int]:
+    return associate(people, [d for d, _ in found], [j for _, j in found], GATE_M)
+
+
+def test_everybody_gets_the_nearest_of_all_assignments(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    people = [expected(body, person, 0.0), expected(body, person, 0.3)]
+    # The second detection is nearer to both people; together they still share out right.
+    found = [seen(body, person, -0.2), seen(body, person, 0.1)]
+    assert matches(people, found) == {0: 0, 1: 1}
+
+
+def test_nobody_is_matched_beyond_the_gate(body: BodyModel, person: BodyParameters) -> None:
+    assert matches([expected(body, person, 0.0)], [seen(body, person, 0.6)]) == {}
+
+
+def test_doubt_of_a_prediction_widens_the_gate(body: BodyModel, person: BodyParameters) -> None:
+    hidden = [expected(body, person, 0.0, doubt_m=0.3)]
+    assert matches(hidden, [seen(body, person, 0.6)]) == {0: 0}
+
+
+def test_of_two_people_in_one_place_pixels_decide(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    found = seen(body, person, 0.0)
+    u, v = np.rint(found[0].keypoints_px).astype(int).T
+    own = NOWHERE.copy()
+    own[v, u] = True
+    people = [expected(body, person, 0.03), expected(body, person, 0.05, mask=own)]
+    assert matches(people, [found]) == {1: 0}
+
+
+def test_of_two_people_in_one_place_size_decides(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    found = seen(body, person, 0.0)
+    here = expected(body, person, 0.05)
+    middle = here.points.mean(axis=0)
+    child = Expected(middle + 0.6 * (here.points - middle), 0.01, NOWHERE)
+    assert matches([child, here], [found]) == {1: 0}
+
+
+def test_size_is_that_of_the_bones(body: BodyModel, person: BodyParameters) -> None:
+    lifted = lift_truth(body, person, sigma_m=0.0)
+    points = expected(body, person, 0.0).points
+    assert log_size(lifted, points / 1.2) == pytest.approx(np.log(1.2), abs=1e-6)
+
+
+def test_without_detections_nobody_is_matched(body: BodyModel, person: BodyParameters) -> None:
+    assert matches([expected(body, person, 0.0)], []) == {}
+    assert matches([], [seen(body, person, 0.0)]) == {}
