@@ -19,13 +19,18 @@ LARGEST = 2**31 - 1  # bytes; an ONNX file cannot be larger
 PARTIAL, UNSATISFIABLE = 206, 416
 
 
-class _SafeRedirects(urllib.request.HTTPRedirectHandler):
+class SafeRedirects(urllib.request.HTTPRedirectHandler):
     """Follows redirects to HTTP only, and never from an encrypted address to a plain one."""
 
     def redirect_request(
         self, req: urllib.request.Request, fp: IO[bytes], code: int, msg: str,
         headers: HTTPMessage, newurl: str,
     ) -> urllib.request.Request | None:
+        """Return the request that follows a redirect.
+
+        Raises:
+            NetworkFileError: If it leads elsewhere.
+        """
         before, after = (urllib.parse.urlsplit(url).scheme for url in (req.full_url, newurl))
         if after not in ('http', 'https') or (before == 'https' and after == 'http'):
             raise NetworkFileError(
@@ -73,7 +78,7 @@ def _open(url: str, start: int) -> HTTPResponse:
     headers = {'User-Agent': 'pop', 'Accept-Encoding': 'identity'}
     if start:
         headers['Range'] = f'bytes={start}-'
-    opener = urllib.request.build_opener(_SafeRedirects())
+    opener = urllib.request.build_opener(SafeRedirects())
     response: HTTPResponse = opener.open(
         urllib.request.Request(url, headers=headers), timeout=TIMEOUT_S)
     return response

@@ -4,8 +4,10 @@ import hashlib
 import io
 import json
 import re
+import urllib.request
 import zipfile
 from dataclasses import replace
+from http.client import HTTPMessage
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from support.onnx_files import save_network
 
 from pop_core.keypoints.decoders import DECODERS
 from pop_ros.keypoint_sources import make_detector
+from pop_ros.network_download import SafeRedirects
 from pop_ros.network_fetch import fetch_network
 from pop_ros.network_registry import (
     NetworkEntry,
@@ -139,6 +142,13 @@ def test_redirects_to_elsewhere_than_http_and_in_circles_are_not(server, target)
     with pytest.raises(NetworkFileError):
         fetch_network(entry)
     nothing_is_kept(entry)
+
+
+def test_redirects_from_an_encrypted_address_to_a_plain_one_are_not_followed():
+    asked = urllib.request.Request('https://example.org/net.onnx')
+    with pytest.raises(NetworkFileError, match='expected a redirect to https'):
+        SafeRedirects().redirect_request(
+            asked, io.BytesIO(), 302, 'Found', HTTPMessage(), 'http://example.org/net.onnx')
 
 
 @pytest.mark.parametrize('url', ['file:///etc/passwd', 'net.onnx', 'http://127.0.0.1:1/net.onnx'])

@@ -140,6 +140,24 @@ def test_a_double_of_one_source_is_not_doubled():
     assert len(fuse([twice])) == 1
 
 
+def test_a_double_does_not_move_whom_it_doubles():
+    (fused,) = fuse([[person(0, 0.9), person(6, 0.8)]])
+    same(fused, person(0, 0.9))
+
+
+def test_joints_that_one_of_both_lacks_say_nothing_about_similarity():
+    legs = ['left_knee', 'right_knee', 'left_ankle', 'right_ankle']
+    assert person_similarity(person(0), person(0, missing=legs)) == pytest.approx(1.0)
+
+
+def test_joints_that_a_source_guesses_count_little():
+    guessed = person(0)
+    guessed.keypoints_px[WRIST] += [90, 0]
+    sure = person_similarity(person(0), guessed)
+    guessed.scores[WRIST] = 0.05
+    assert person_similarity(person(0), guessed) > max(sure, 0.97)
+
+
 def test_neighbours_are_not_taken_for_each_other():
     # Shoulder to shoulder, both seen by both.
     width = np.ptp(person().keypoints_px[:, 0])

@@ -65,6 +65,30 @@ def spec_of(layout, *, together, size=(8 * H, 8 * W)):
     return NetworkSpec((TensorSpec('image', (1, 3, *size), 'float32'),), outputs)
 
 
+# Pairs of keypoints and channels of their fields as OpenPose publishes them (its pose parameters),
+# limbs of the face and the feet left out.
+PUBLISHED = {
+    'BODY_25': (
+        [1, 8, 1, 2, 1, 5, 2, 3, 3, 4, 5, 6, 6, 7, 8, 9, 9, 10, 10, 11, 8, 12, 12, 13, 13, 14, 1,
+         0],
+        [0, 1, 14, 15, 22, 23, 16, 17, 18, 19, 24, 25, 26, 27, 6, 7, 2, 3, 4, 5, 8, 9, 10, 11, 12,
+         13, 30, 31]),
+    'COCO-18': (
+        [1, 2, 1, 5, 2, 3, 3, 4, 5, 6, 6, 7, 1, 8, 8, 9, 9, 10, 1, 11, 11, 12, 12, 13, 1, 0],
+        [12, 13, 20, 21, 14, 15, 16, 17, 22, 23, 24, 25, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 28,
+         29]),
+}
+
+
+@pytest.mark.parametrize('layout', LAYOUTS, ids=lambda layout: layout.keypoints.name)
+def test_fields_are_those_that_openpose_publishes(layout):
+    pairs, channels = PUBLISHED[layout.keypoints.name]
+    limbs = [value for limb in layout.limbs for value in (limb.first, limb.second)]
+    fields = [value for limb in layout.limbs for value in (limb.field, limb.field + 1)]
+    assert limbs == pairs
+    assert fields == channels
+
+
 @pytest.mark.parametrize('together', [True, False])
 @pytest.mark.parametrize('layout', LAYOUTS, ids=lambda layout: layout.keypoints.name)
 def test_people_come_back_from_perfect_maps(layout, together):
