@@ -32,19 +32,29 @@ table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: .3rem .9rem .3rem 0; text-align: right; border-bottom: 1px solid var(--line); }
 th:first-child, td:first-child { text-align: left; }
 pre { padding: .8rem 1rem; border: 1px solid var(--line); border-radius: 6px; overflow-x: auto; }
+button { font: inherit; padding: .15rem .7rem; border-radius: 6px; cursor: pointer;
+         border: 1px solid var(--line); background: none; color: inherit; }
 input[type=range] { width: 100%; margin: .8rem 0 0; }
 figcaption { font-size: .92rem; opacity: .8; margin-top: .35rem; } figure { margin: 1rem 0; }
 """
 FILM_SCRIPT = """
 for (const film of document.querySelectorAll('.film')) {
   const frames = JSON.parse(film.querySelector('script').textContent);
-  const [picture, slider, caption] =
-    ['img', 'input', 'figcaption'].map(name => film.querySelector(name));
+  const [picture, slider, button, caption] =
+    ['img', 'input', 'button', 'figcaption'].map(name => film.querySelector(name));
+  let timer = 0;
   const show = () => {
     picture.src = 'data:image/jpeg;base64,' + frames[slider.value].jpeg;
     caption.textContent = frames[slider.value].caption;
   };
-  slider.addEventListener('input', show); show();
+  const stop = () => { clearInterval(timer); timer = 0; button.textContent = 'play'; };
+  const next = () => { slider.value = (Number(slider.value) + 1) % frames.length; show(); };
+  slider.addEventListener('input', () => { stop(); show(); });
+  button.addEventListener('click', () => {
+    if (timer) stop();
+    else { timer = setInterval(next, 250); button.textContent = 'pause'; }
+  });
+  show();
 }
 """
 
@@ -111,11 +121,12 @@ class Report:
         frames = [{'jpeg': p.jpeg, 'caption': p.caption} for p in pictures]
         # A closing tag inside the data would end the script.
         data = json.dumps(frames).replace('</', '<\\/')
+        alone = ' hidden' if len(frames) == 1 else ''
         self._parts.append(
             '<figure class="film"><img alt="">'
             f'<input type="range" min="0" max="{len(frames) - 1}" value="{len(frames) // 2}" '
-            f'aria-label="frame"{" hidden" if len(frames) == 1 else ""}><figcaption></figcaption>'
-            f'<script type="application/json">{data}</script></figure>')
+            f'aria-label="frame"{alone}><button type="button"{alone}>play</button>'
+            f'<figcaption></figcaption><script type="application/json">{data}</script></figure>')
 
     def scenes(self, scenes: Sequence[SceneFrame], f: np.ndarray) -> None:
         """Add a 3D view of frames, of which a slider shows one; `f` are the meshes' triangles."""

@@ -29,8 +29,6 @@ STYLE = """
                   background: #2c3037; cursor: grab; touch-action: none; }
 .scene3d .bar { display: flex; flex-wrap: wrap; gap: .5rem 1rem; margin: .5rem 0;
                 font-size: .92rem; align-items: center; }
-.scene3d button { font: inherit; padding: .15rem .7rem; border-radius: 6px; cursor: pointer;
-                  border: 1px solid var(--line); background: none; color: inherit; }
 """
 
 

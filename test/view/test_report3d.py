@@ -18,7 +18,7 @@ from pop_core.rendering.palette import person_color
 from pop_core.rendering.shown_body import ShownBody
 from pop_core.rgbd import point_cloud
 from pop_core.synthesis.sequence import synthesise_sequence
-from pop_ros.report import Report
+from pop_ros.report import Picture, Report
 from pop_ros.report3d import SceneFrame, scene_data, scene_html
 
 BACKGROUND = (0x2c, 0x30, 0x37)
@@ -149,6 +149,27 @@ def test_the_viewer_can_walk_around(page: Path, oblique: np.ndarray, act: str) -
     seen = mesh_colored(moved)
     assert seen.sum() > 5000
     assert (seen != mesh_colored(oblique)).sum() > 3000
+
+
+@needs_chromium
+def test_a_film_plays_until_it_is_paused(tmp_path: Path) -> None:
+    report = Report('A film', 'Red, green, blue.')
+    colors = np.array([[200, 30, 30], [30, 200, 30], [30, 30, 200]], np.uint8)
+    report.film([Picture.encoded(np.full((200, 300, 3), color, np.uint8), 'a colour', 640)
+                 for color in colors])
+    report.write(tmp_path / 'film.html')
+
+    def shown(act: str) -> int:
+        picture = photograph(tmp_path / 'film.html', act)
+        counts = [colored_like(picture, tuple(color), 4.0).sum() for color in colors.tolist()]
+        assert max(counts) > 20_000
+        assert sorted(counts)[1] < 1000
+        return int(np.argmax(counts))
+
+    play = "const button = document.querySelector('.film button'); button.click();"
+    assert shown('') == 1  # the middle
+    assert shown(f'{play} setTimeout(() => button.click(), 350);') == 2
+    assert shown(f'{play} setTimeout(() => button.click(), 600);') == 0
 
 
 def test_a_page_may_fetch_nothing(page: Path) -> None:
