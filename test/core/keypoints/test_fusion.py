@@ -262,3 +262,44 @@ def test_random_people_merge_without_trouble(seed):
         assert np.isfinite(p.box_px).all()
     again = fuse([fused])
     assert len(again) <= len(fused)
+
+
+def sees(truth, rng):
+    """What a mediocre network sees of people: noise, gaps, wild guesses, sides exchanged."""
+    seen = []
+    for one in truth:
+        if rng.random() < 0.15:
+            continue
+        scores = rng.uniform(0.5, 0.95, 15)
+        uv = one.keypoints_px + rng.normal(0, 1, (15, 2)) * 4.0 / scores[:, None]
+        wild = rng.random(15) < 0.1
+        uv[wild] += rng.normal(0, 60, (15, 2))[wild]
+        scores[wild] *= 0.5
+        scores[rng.random(15) < 0.15] = 0.0
+        found = detection_of(uv, scores)
+        seen.append(mirrored(found) if rng.random() < 0.1 else found)
+    return seen
+
+
+def test_two_mediocre_sources_make_a_better_one():
+    rng = np.random.default_rng(0)
+    truth = [person(shift) for shift in (-180, 0, 180)]
+    gaps = {'one': [], 'both': []}
+    found = {'one': 0, 'both': 0}
+    missing = {'one': 0, 'both': 0}
+    for _ in range(60):
+        sources = [sees(truth, rng) for _ in range(2)]
+        results = {'one': sources[0], 'both': fuse(sources)}
+        assert len(results['both']) <= 3
+        for name, people in results.items():
+            found[name] += len(people)
+            for one in people:
+                nearest = min(truth, key=lambda t, p=one: abs(
+                    np.nanmedian(t.keypoints_px[:, 0] - p.keypoints_px[:, 0])))
+                gap = np.linalg.norm(one.keypoints_px - nearest.keypoints_px, axis=1)
+                gaps[name] += gap[one.scores > 0].tolist()
+                missing[name] += int(np.count_nonzero(one.scores == 0))
+    assert found['both'] > 1.08 * found['one']
+    assert missing['both'] / found['both'] < 0.6 * missing['one'] / found['one']
+    assert np.median(gaps['both']) < 0.95 * np.median(gaps['one'])
+    assert np.percentile(gaps['both'], 90) < 0.8 * np.percentile(gaps['one'], 90)
