@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Any
 
 from geometry_msgs.msg import PoseArray
@@ -70,21 +70,28 @@ class BodyMessages:
         A frame without people gives messages only when somebody has just left: removals, and one
         empty set of joints and points. Only the overlay, a picture, comes with every frame.
         """
+        return list(self.stream(result, frame, frame_id, wanted))
+
+    def stream(
+        self, result: FrameResult, frame: RgbdFrame, frame_id: str, wanted: Collection[str]
+    ) -> Iterator[Output]:
+        """Yield the messages of `build` as they are made, so that none waits for a slower one."""
         bodies = result.bodies
         ids = self._ids.of(bodies)
         self._latest = frame, frame_id
-        header = to_messages.make_header(frame.stamp_ns, frame_id)
-        picture = [(OVERLAY, self._overlay(result, frame, header))] if OVERLAY in wanted else []
         self._markers.start_frame(frame.stamp_ns)
-        return picture + self._people(bodies, ids, wanted)
+        yield from self._people(bodies, ids, wanted)
+        if OVERLAY in wanted:
+            header = to_messages.make_header(frame.stamp_ns, frame_id)
+            yield OVERLAY, self._overlay(result, frame, header)
 
     def clear(self, wanted: Collection[str] = tuple(RECORDED_TYPES)) -> list[Output]:
         """Return what says that everybody has left, with stamp and frame of the latest image."""
-        return [] if self._latest is None else self._people((), (), wanted)
+        return [] if self._latest is None else list(self._people((), (), wanted))
 
     def _people(
         self, bodies: Sequence[BodyEstimate], ids: Sequence[int], wanted: Collection[str]
-    ) -> list[Output]:
+    ) -> Iterator[Output]:
         assert self._latest is not None
         frame, frame_id = self._latest
         header = to_messages.make_header(frame.stamp_ns, frame_id)
@@ -103,9 +110,10 @@ class BodyMessages:
         if bodies:
             makers[TF] = lambda: [
                 transforms_message(bodies, ids, header, self._config.tf.frames)]
-        chosen = [(name, make()) for name, make in makers.items() if name in wanted]
-        found = [(name, message) for name, made in chosen for message in made]
-        return found + self._for_others(bodies, ids, wanted, changed=changed)
+        for name, make in makers.items():
+            if name in wanted:
+                yield from ((name, message) for message in make())
+        yield from self._for_others(bodies, ids, wanted, changed=changed)
 
     def _for_others(
         self, bodies: Sequence[BodyEstimate], ids: Sequence[int], wanted: Collection[str], *,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,12 +28,12 @@ class FittedFrame:
     Args:
         frame: The frame itself.
         result: The pipeline's result.
-        outputs: Messages by topic.
+        outputs: Messages by topic, made while they are read, once.
     """
 
     frame: RgbdFrame
     result: FrameResult
-    outputs: list[Output]
+    outputs: Iterator[Output]
 
 
 class FrameFitter:
@@ -107,5 +107,5 @@ class FrameFitter:
         frame = self._maker.make(color, depth, info, depth_info)
         tracked = self._tracker.config.enabled
         result = (self._tracker if tracked else self._pipeline).process(frame)
-        outputs = self._messages.build(result, frame, color.header.frame_id, wanted)
+        outputs = self._messages.stream(result, frame, color.header.frame_id, wanted)
         return FittedFrame(frame, result, outputs)

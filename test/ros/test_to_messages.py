@@ -211,6 +211,14 @@ def test_the_overlay_comes_with_every_frame_and_shows_the_body(
     assert changed[body(model).mask].mean() > 0.3
 
 
+def test_the_overlay_which_takes_longest_holds_up_no_other_message(
+    model: BodyModel, frame: RgbdFrame
+) -> None:
+    messages = BodyMessages(model, NodeConfig())
+    stream = messages.stream(result(body(model)), frame, 'optical', ('overlay', 'mesh', 'joints'))
+    assert [name for name, _ in stream] == ['mesh', 'joints', 'overlay']
+
+
 def test_after_a_reset_ids_start_anew_and_old_ones_are_removed(
     model: BodyModel, frame: RgbdFrame
 ) -> None:
