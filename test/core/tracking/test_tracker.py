@@ -1,0 +1,186 @@
+"""One person before a wall, frame by frame: ids, states and ages, from first look to end."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.one_person import CAMERA, photograph
+
+from pop_core.body.kinematics import attached_positions, joints
+from pop_core.body.model import BodyModel, BodyParameters, shared_points
+from pop_core.estimate import BodyEstimate, TrackState
+from pop_core.keypoints.detection import Detection
+from pop_core.pipeline import BodyPipeline
+from pop_core.retrieval.default_library import default_library
+from pop_core.rgbd import RgbdFrame
+from pop_core.tracking.tracker import BodyTracker
+from pop_core.tracking.tracking_config import TrackingConfig
+
+RATE_HZ = 15.0
+BOARD_M = 1.5  # something in front of everything
+
+
+class Scripted:
+    """A keypoint source that knows the truth and counts how often it is asked."""
+
+    def __init__(self, body: BodyModel) -> None:
+        self.body, self.person, self.asked = body, None, 0
+
+    def detect(self, frame: RgbdFrame) -> list[Detection]:
+        self.asked += 1
+        if self.person is None:
+            return []
+        points = attached_positions(shared_points(self.body), self.body, self.person)
+        uv = frame.camera.project(points)
+        box = np.concatenate([uv.min(axis=0), uv.max(axis=0)])
+        return [Detection(uv, np.full(15, 0.9), box)]
+
+
+class Stage:
+    """A tracker, what it sees, and the clock."""
+
+    def __init__(self, body: BodyModel, config: TrackingConfig | None = None) -> None:
+        self.body, self.source = body, Scripted(body)
+        pipeline = BodyPipeline(body, default_library(), self.source)
+        self.tracker = BodyTracker(pipeline, config)
+        self.stamp_ns = 1_000_000_000
+
+    def show(
+        self, person: BodyParameters | None, *, hidden: bool = False, times: int = 1
+    ) -> list[BodyEstimate]:
+        """Show a person, an empty room, or a board before it; the last frame's bodies."""
+        for _ in range(times):
+            self.stamp_ns += round(1e9 / RATE_HZ)
+            frame = self.frame(person, hidden=hidden)
+            self.source.person = None if hidden else person
+            bodies = list(self.tracker.process(frame).bodies)
+        return bodies
+
+    def frame(self, person: BodyParameters | None, *, hidden: bool) -> RgbdFrame:
+        behind = BodyParameters(
+            np.array([0.0, 0.0, -5.0]), np.zeros(3), np.zeros((23, 3)), np.zeros(10))
+        frame = photograph(self.body, behind if person is None else person)
+        if hidden:
+            frame = replace(frame, depth_m=np.full_like(frame.depth_m, BOARD_M))
+        return replace(frame, stamp_ns=self.stamp_ns)
+
+
+def only(bodies: list[BodyEstimate]) -> BodyEstimate:
+    assert len(bodies) == 1
+    assert bodies[0].track is not None
+    return bodies[0]
+
+
+@pytest.fixture
+def stage(body: BodyModel) -> Stage:
+    return Stage(body)
+
+
+def test_a_walker_keeps_the_id_and_is_followed(
+    stage: Stage, body: BodyModel, person: BodyParameters
+) -> None:
+    for k in range(12):
+        here = person.replaced(transl=person.transl + [0.04 * k, 0.0, 0.0])
+        found = only(stage.show(here))
+        assert found.track.id == 0
+        if k == 0:
+            assert found.track.state is TrackState.NEW
+    assert found.track.state is TrackState.TRACKED
+    assert found.track.age_s == pytest.approx(11 / RATE_HZ)
+    assert found.track.unseen_s == 0.0
+    off = np.linalg.norm(found.joints - joints(body, here), axis=1)
+    assert off.mean() < 0.03  # the coarse mesh and the few steps of a tracked frame
+
+
+def test_the_detector_is_asked_every_few_frames_only(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    stage = Stage(body, TrackingConfig(detect_every=3))
+    stage.show(person, times=4)
+    before = stage.source.asked
+    stage.show(person, times=9)
+    assert stage.source.asked - before == 3
+
+
+def test_somebody_hidden_is_predicted_with_growing_doubt_and_then_lost(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    stage = Stage(body, TrackingConfig(predicted_s=0.5))
+    seen = only(stage.show(person, times=5))
+    doubts = [np.trace(seen.joint_covariance[0])]
+    for _ in range(5):
+        found = only(stage.show(person, hidden=True))
+        assert found.track.state is TrackState.PREDICTED
+        assert not found.mask.any()
+        doubts.append(np.trace(found.joint_covariance[0]))
+    assert (np.diff(doubts) > 0).all()
+    assert found.track.unseen_s == pytest.approx(5 / RATE_HZ)
+    np.testing.assert_allclose(found.track.joint_unseen_s.min(), 5 / RATE_HZ)
+    assert stage.show(person, hidden=True, times=5) == []
+
+
+def test_somebody_found_again_within_three_seconds_is_the_same_person(
+    stage: Stage, person: BodyParameters
+) -> None:
+    stage.show(person, times=5)
+    stage.show(person, hidden=True, times=int(2.5 * RATE_HZ))
+    again = person.replaced(transl=person.transl + [0.3, 0.0, 0.0])
+    found = only(stage.show(again, times=3))
+    assert found.track.id == 0
+    assert found.track.state is TrackState.TRACKED
+
+
+def test_somebody_found_later_is_somebody_new(stage: Stage, person: BodyParameters) -> None:
+    stage.show(person, times=5)
+    stage.show(person, hidden=True, times=int(3.5 * RATE_HZ))
+    assert only(stage.show(person)).track.id == 1
+
+
+def test_somebody_who_is_gone_is_not_given_out(stage: Stage, person: BodyParameters) -> None:
+    stage.show(person, times=5)
+    assert stage.show(None) == []
+
+
+def test_a_jump_back_in_time_begins_anew_with_new_ids(
+    stage: Stage, person: BodyParameters
+) -> None:
+    stage.show(person, times=5)
+    stage.stamp_ns -= 2_000_000_000
+    found = only(stage.show(person))
+    assert (found.track.id, found.track.state, found.track.age_s) == (1, TrackState.NEW, 0.0)
+
+
+def test_another_camera_begins_anew(stage: Stage, person: BodyParameters) -> None:
+    stage.show(person, times=4)
+    frame = stage.frame(person, hidden=False)
+    other = replace(CAMERA, fx=CAMERA.fx * 1.02, fy=CAMERA.fy * 1.02)
+    bodies = stage.tracker.process(replace(frame, camera=other)).bodies
+    assert [body.track.id for body in bodies] == [1]
+
+
+def test_a_reset_counts_from_zero(stage: Stage, person: BodyParameters) -> None:
+    stage.show(person, times=2)
+    stage.tracker.reset()
+    assert only(stage.show(person)).track.id == 0
+
+
+def test_frames_of_one_stamp_are_one_moment(stage: Stage, person: BodyParameters) -> None:
+    stage.show(person, times=3)
+    stage.stamp_ns -= round(1e9 / RATE_HZ)
+    assert only(stage.show(person)).track.id == 0
+
+
+def test_settings_change_without_losing_people(stage: Stage, person: BodyParameters) -> None:
+    stage.show(person, times=4)
+    stage.tracker.configure(stage.tracker.pipeline, TrackingConfig(steps=3))
+    found = only(stage.show(person))
+    assert (found.track.id, found.track.state) == (0, TrackState.TRACKED)
+
+
+def test_smoothing_lags_behind_by_its_share(body: BodyModel, person: BodyParameters) -> None:
+    plain, smooth = Stage(body), Stage(body, TrackingConfig(smoothing=0.8))
+    moved = person.replaced(transl=person.transl + [0.05, 0.0, 0.0])
+    for stage in (plain, smooth):
+        stage.show(person, times=5)
+    ahead, behind = (only(stage.show(moved)).joints[0, 0] for stage in (plain, smooth))
+    assert 0.02 < ahead - behind < 0.05
