@@ -92,7 +92,8 @@ def shown_bodies(
         rendered = render_depth(vertices, model.f, frame.camera)
         state = fitted_joint_states(model, joints, rendered, frame.depth_m, frame.camera)
         points = recorded.cloud[recorded.cloud['person'] == person]
-        bodies.append(ShownBody(vertices, joints, state, cloud_mask(points, frame.camera)))
+        mask = cloud_mask(points, frame.camera)
+        bodies.append(ShownBody(vertices, joints, state, mask, person))
     return bodies
 
 

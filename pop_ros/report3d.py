@@ -17,9 +17,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pop_core.body.joints import PARENTS
-from pop_core.rendering.palette import person_color
 from pop_core.rendering.pictures import undistorted_mask
-from pop_core.rendering.shown_body import ShownBody
+from pop_core.rendering.shown_body import ShownBody, body_color
 from pop_core.rgbd import RgbdFrame, point_cloud, undistort_frame
 
 MAX_POINTS = 36_000  # of room and of people: 0.4 MB of a page each, at most
@@ -97,7 +96,7 @@ def _frame_data(scene: SceneFrame) -> dict[str, Any]:
 
 def _body_data(body: ShownBody, index: int) -> dict[str, Any]:
     return {
-        'color': 'rgb({},{},{})'.format(*person_color(index)),
+        'color': 'rgb({},{},{})'.format(*body_color(body, index)),
         'vertices': _millimetres(body.vertices),
         'joints': _millimetres(body.joints),
         'states': body.joint_state.tolist(),

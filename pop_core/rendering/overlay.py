@@ -8,18 +8,22 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, UInt8
 
-from pop_core.body.joints import PARENTS
+from pop_core.body.joints import JOINT_INDEX, PARENTS
 from pop_core.estimate import JointState
 from pop_core.geometry.camera import Camera
 from pop_core.rendering.palette import INK, PAPER, person_color
 from pop_core.rendering.shading import shade
-from pop_core.rendering.shown_body import ShownBody
+from pop_core.rendering.shown_body import ShownBody, body_color
 
 OPACITY, HIDDEN_OPACITY = 0.74, 0.34
 HIDDEN_M = 0.12  # so far behind what was measured: noise and the error of a fit are smaller
 EXPOSURE = 1.3  # of the mesh, which would look dull over a bright photograph
 SHIFT = 4  # fractional bits of cv2's coordinates: joints are drawn where they are
 AROUND_JOINT_M = 0.024
+HEAD = JOINT_INDEX['head']
+ABOVE_HEAD_M = 0.24  # the joint lies in the neck's upper end
+PLATE_PX = 4
+FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
 def draw_people(
@@ -41,10 +45,14 @@ def draw_people(
     picture = rgb.copy()
     order = sorted(range(len(bodies)), key=lambda i: -float(bodies[i].joints[0, 2]))
     for index in order:
-        draw_mesh(picture, bodies[index].vertices, f, camera, person_color(index), depth_m)
+        color = body_color(bodies[index], index)
+        draw_mesh(picture, bodies[index].vertices, f, camera, color, depth_m)
     for index in order:
-        draw_mask_contour(picture, bodies[index].mask, person_color(index))
+        draw_mask_contour(picture, bodies[index].mask, body_color(bodies[index], index))
         draw_skeleton(picture, bodies[index].joints, bodies[index].joint_state, camera)
+    for index in order:
+        if bodies[index].id is not None:
+            draw_id(picture, bodies[index], camera)
     return picture
 
 
@@ -98,6 +106,24 @@ def draw_skeleton(
             radius = float(np.clip(AROUND_JOINT_M * camera.fx / z, 2.5, 7.0))
             filled = bool(state == JointState.VISIBLE)
             _draw_joint(picture, point, radius, width, filled=filled)
+
+
+def draw_id(
+    picture: UInt8[np.ndarray, 'h w 3'], body: ShownBody, camera: Camera
+) -> None:
+    """Write a person's number on a plate above the head, or at the edge where that is outside."""
+    assert body.id is not None
+    uv = camera.project((body.joints[HEAD] - [0.0, ABOVE_HEAD_M, 0.0])[None])[0]
+    if not np.isfinite(uv).all():
+        return
+    scale = max(0.5, picture.shape[1] / 1100)
+    (width, height), _ = cv2.getTextSize(f'{body.id}', FONT, scale, 2)
+    u, v = np.rint(np.clip(uv, -1e4, 1e4)).astype(int)
+    left, bottom = int(u) - width // 2, max(int(v), height + PLATE_PX)
+    corners = (left - PLATE_PX, bottom - height - PLATE_PX), (
+        left + width + PLATE_PX, bottom + PLATE_PX)
+    cv2.rectangle(picture, *corners, person_color(body.id), cv2.FILLED)
+    cv2.putText(picture, f'{body.id}', (left, bottom), FONT, scale, INK, 2, cv2.LINE_AA)
 
 
 def _draw_joint(

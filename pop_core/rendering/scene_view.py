@@ -14,9 +14,9 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 from pop_core.geometry.camera import Camera
-from pop_core.rendering.palette import FAINT, INK, PAPER, person_color
+from pop_core.rendering.palette import FAINT, INK, PAPER
 from pop_core.rendering.shading import shade
-from pop_core.rendering.shown_body import ShownBody
+from pop_core.rendering.shown_body import ShownBody, body_color
 from pop_core.rgbd import RgbdFrame, point_cloud
 
 # Rows are the view's axes in the camera frame.
@@ -80,7 +80,8 @@ def draw_scene(
         enumerate(bodies), key=lambda item: -view.points(item[1].joints)[0, 2])
     covered = dict.fromkeys(range(len(bodies)), 0)
     for index, body in farthest_first:
-        rendered, shaded = shade(view.points(body.vertices), f, view.camera, person_color(index))
+        rendered, shaded = shade(
+            view.points(body.vertices), f, view.camera, body_color(body, index))
         seen = rendered.covered
         picture[seen] = np.rint(OPACITY * shaded[seen] + (1 - OPACITY) * picture[seen])
         covered[index] = int(seen.sum())

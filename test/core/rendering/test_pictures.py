@@ -106,6 +106,20 @@ def test_measured_points_leave_most_of_a_mesh_to_be_seen():
     assert 0.02 < changed.sum() / mesh.sum() < 0.4
 
 
+def test_a_person_keeps_color_and_number_wherever_in_the_list():
+    rgb = np.full((CAMERA.height, CAMERA.width, 3), GRAY, np.uint8)
+    near, far = replace(body(1.6)[0], id=3), replace(body(2.4)[0], id=1)
+    f = body()[1]
+    one, other = (draw_people(rgb, people, f, CAMERA) for people in ([near, far], [far, near]))
+    assert np.array_equal(one, other)
+    unnamed = draw_people(rgb, [replace(near, id=None)], f, CAMERA)
+    named = draw_people(rgb, [replace(near, id=0)], f, CAMERA)
+    changed = np.argwhere((unnamed != named).any(axis=2))
+    above = CAMERA.project(near.joints[[15]] - [0, 0.24, 0])[0, ::-1]
+    assert len(changed)  # the number, above the head and nowhere else
+    assert np.abs(changed - above).max() < 25
+
+
 def test_drawing_leaves_the_image_it_was_given_alone():
     frame = plain_frame()
     draw_people(frame.rgb, [body()[0]], body()[1], CAMERA)
