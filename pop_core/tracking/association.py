@@ -67,17 +67,24 @@ def matching_cost(
 
     The median over joints: some limbs were lifted onto something else.
     """
-    rows = lifted.lifted
     overlap = mask_overlap(person.mask, detection)
-    if not rows.any():
+    if not lifted.lifted.any():
         return NO_MATCH if overlap < 0.5 else MASK_WORTH_M * (2.0 - overlap)
-    offset = np.linalg.norm(person.points[rows] - lifted.positions_camera[rows], axis=1)
-    distance = float(np.median(offset))
+    distance = offset_m(person, lifted)
     if distance > gate_m + 2.0 * min(person.doubt_m, UNSURE_M / 2.0):
         return NO_MATCH
     size = log_size(lifted, person.points)
     strange = max(0.0, abs(size) - SIZE_SIGMA)
     return distance + SIZE_WORTH_M * strange + MASK_WORTH_M * (1.0 - overlap)
+
+
+def offset_m(person: Expected, lifted: LiftedJoints) -> float:
+    """Return how far lifted joints lie from a person's, the median; 0 where none is lifted."""
+    rows = lifted.lifted
+    if not rows.any():
+        return 0.0
+    offset = np.linalg.norm(person.points[rows] - lifted.positions_camera[rows], axis=1)
+    return float(np.median(offset))
 
 
 def mask_overlap(mask: Bool[np.ndarray, 'h w'], detection: Detection) -> float:

@@ -7,14 +7,21 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from pop_core.estimate import BodyEstimate, EstimateStatus, FrameResult, TrackState
+from pop_core.body.joints import SHARED
+from pop_core.estimate import (
+    BodyEstimate,
+    EstimateStatus,
+    FrameResult,
+    JointState,
+    TrackState,
+)
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.undistortion import undistort_detection
 from pop_core.pipeline import BodyPipeline, Scene
 from pop_core.rgbd import RgbdFrame, distort_mask, undistort_frame
 from pop_core.segmentation.ground import Ground, find_ground
 from pop_core.stopwatch import Stopwatch
-from pop_core.tracking.association import associate
+from pop_core.tracking.association import Expected, associate, offset_m
 from pop_core.tracking.body_filter import first_state
 from pop_core.tracking.detection_schedule import DetectionSchedule
 from pop_core.tracking.finder import Finder, Found
@@ -25,6 +32,8 @@ from pop_core.tracking.tracking_config import TrackingConfig
 STALE_S = 0.25  # unseen for longer, a person is looked for anew
 MOST_DOUBTS, RESTART_EVERY_S = 2, 1.0
 MOST_MISSES = 3
+CLEARLY_SEEN = 8  # shared joints that a body claims the camera sees: a detector would find it
+ASTRAY_M = 0.3  # doubt of the place of somebody whom keypoints contradict
 
 
 class BodyTracker:
@@ -105,7 +114,7 @@ class BodyTracker:
         with watch.step('predict'):
             for track in self._tracks:
                 self._follower.predict(track, frame.stamp_ns)
-            expected = [self._follower.expected(track) for track in self._tracks]
+            expected = [self._expected(track) for track in self._tracks]
             matches = associate(
                 expected, found.detections, found.lifted, self.config.gate_m)
         scene = Scene(frame, self._ground, np.zeros(frame.depth_m.shape, dtype=bool))
@@ -114,7 +123,9 @@ class BodyTracker:
             track, index = self._tracks[row], matches.get(row)
             if looked is not None:
                 _count_misses(track, index is not None)
-            estimate = self._continue(track, scene, found, index, watch)
+            astray = index is not None and offset_m(
+                expected[row], found.lifted[index]) > self.config.gate_m
+            estimate = self._continue(track, scene, found, index, watch, astray=astray)
             if estimate is not None:
                 bodies.append(estimate)
                 scene = replace(scene, taken=scene.taken | estimate.mask)
@@ -127,15 +138,22 @@ class BodyTracker:
         self._tracks = [t for t in self._tracks if not t.has_ended(self.config)]
         return bodies, statuses
 
+    def _expected(self, track: PersonTrack) -> Expected:
+        """Return where a person should be; whom keypoints contradict may be elsewhere."""
+        expected = self._follower.expected(track)
+        if track.doubts == 0 and track.misses == 0:
+            return expected
+        return replace(expected, doubt_m=max(expected.doubt_m, ASTRAY_M))
+
     def _continue(
         self, track: PersonTrack, scene: Scene, found: Found, index: int | None,
-        watch: Stopwatch,
+        watch: Stopwatch, *, astray: bool,
     ) -> BodyEstimate | None:
         """Return a known person in this frame, or None where nothing is given out."""
         lifted = None
         if index is not None:
             lifted = self._finder.lifted_behind(scene, found, index)
-            if _needs_restart(track):
+            if astray or _needs_restart(track):
                 with watch.step('restart'):
                     person = self._finder.fit(scene, found, index)
                     if person.fit is not None:
@@ -181,7 +199,8 @@ def _needs_restart(track: PersonTrack) -> bool:
 
 
 def _count_misses(track: PersonTrack, was_detected: bool) -> None:
-    """Give up a new body that no further look for people confirms."""
+    """Give up a body that no further look for people confirms: a new one, or one in full view."""
     track.misses = 0 if was_detected else track.misses + 1
-    if track.misses >= MOST_MISSES and track.state is TrackState.NEW:
+    clear = (track.joint_state[SHARED] == JointState.VISIBLE).sum() >= CLEARLY_SEEN
+    if track.misses >= MOST_MISSES and (track.state is TrackState.NEW or clear):
         track.state = TrackState.LOST
