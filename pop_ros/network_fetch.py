@@ -39,6 +39,8 @@ def fetch_network(
             what was published.
         OSError: If the cache cannot be written.
     """
+    if sha256 is None and _is_there(entry, None):
+        return False
     wanted = _wanted(entry, sha256)
     if _is_there(entry, wanted):
         return False
@@ -68,8 +70,8 @@ def _wanted(entry: NetworkEntry, given: str | None) -> str:
     return entry.sha256 or str(given).lower()
 
 
-def _is_there(entry: NetworkEntry, wanted: str) -> bool:
-    """Return whether the network is cached, unchanged, and of the wanted download."""
+def _is_there(entry: NetworkEntry, wanted: str | None) -> bool:
+    """Return whether the network is cached, unchanged, and of the wanted download, if any."""
     try:
         verified_network(entry, wanted)
     except NetworkFileError:

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from openpose_maps import perfect_maps
 
 from pop_core.body.joints import SHARED_INDEX, SHARED_NAMES
 from pop_core.keypoints.decoders import choose_decoder
@@ -23,36 +24,8 @@ def standing(u, v, height):
     return {name: np.array([u, v]) + height * np.array(xy) for name, xy in STANDING.items()}
 
 
-def perfect_maps(people, layout, sigma=1.0):
-    """Heatmaps and fields, in cells, that a network of the layout is trained to draw."""
-    v, u = np.mgrid[:H, :W].astype(float)
-    heat = np.zeros((layout.heat, H, W), np.float32)
-    fields = np.zeros((layout.fields, H, W), np.float32)
-    for person in people:
-        for row, name in enumerate(layout.keypoints.names):
-            if name in person:
-                squared = (u - person[name][0]) ** 2 + (v - person[name][1]) ** 2
-                heat[row] = np.maximum(heat[row], 0.9 * np.exp(-squared / (2 * sigma**2)))
-        for limb in layout.limbs:
-            names = [layout.keypoints.names[j] for j in (limb.first, limb.second)]
-            if all(name in person for name in names):
-                draw_limb(fields[limb.field: limb.field + 2], *(person[n] for n in names))
-    return heat, fields
-
-
-def draw_limb(field, a, b):
-    v, u = np.mgrid[:H, :W].astype(float)
-    way = b - a
-    length = np.linalg.norm(way)
-    unit = way / length
-    along = (u - a[0]) * unit[0] + (v - a[1]) * unit[1]
-    across = np.abs((u - a[0]) * unit[1] - (v - a[1]) * unit[0])
-    near = (along > -1.0) & (along < length + 1.0) & (across < 1.2)
-    field[:, near] = unit[:, None]
-
-
 def network_of(people, layout, *, together):
-    heat, fields = perfect_maps(people, layout)
+    heat, fields = perfect_maps(people, layout, (H, W))
     if together:
         return [np.concatenate([heat, fields])[None]]
     return [0 * heat[None], 0 * fields[None], heat[None], fields[None]]
@@ -113,7 +86,7 @@ def test_people_come_back_from_perfect_maps(layout, together):
 def test_crossing_people_keep_their_own_limbs(layout):
     # The second stands half a shoulder's width beside the first, and higher.
     people = [standing(28, 24, 36), standing(33, 21, 36)]
-    heat, fields = perfect_maps(people, layout)
+    heat, fields = perfect_maps(people, layout, (H, W))
     found = group_people(heat[:-1], fields, layout.limbs)
     assert len(found) == 2
     for person in people:
@@ -128,7 +101,7 @@ def test_crossing_people_keep_their_own_limbs(layout):
 def test_somebody_without_a_head_is_found_from_the_hips_down():
     person = {name: uv for name, uv in standing(30, 10, 36).items()
               if name.split('_')[-1] in ('pelvis', 'hip', 'knee', 'ankle')}
-    heat, fields = perfect_maps([person], BODY_25_FIELDS)
+    heat, fields = perfect_maps([person], BODY_25_FIELDS, (H, W))
     (found,) = group_people(heat[:-1], fields, BODY_25_FIELDS.limbs)
     assert np.count_nonzero(found[:, 2]) == len(person)
 
@@ -144,7 +117,7 @@ def test_peaks_lie_between_cells():
 
 
 def test_a_limb_turned_around_does_not_count():
-    heat, fields = perfect_maps([standing(30, 23, 36)], BODY_25_FIELDS)
+    heat, fields = perfect_maps([standing(30, 23, 36)], BODY_25_FIELDS, (H, W))
     a = find_peaks(heat[1])
     b = find_peaks(heat[8])
     assert limb_scores(a, b, fields[0], fields[1])[0, 0] > 0.9
