@@ -1,4 +1,7 @@
-"""Keypoints for `pop fit`: each frame's own file, networks for all frames, or both merged."""
+"""Keypoints for `pop fit`: each frame's own file, networks for all frames, or both merged.
+
+Where nothing is named and a frame has no file, the embedded network looks at its depth.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +22,12 @@ class FrameKeypoints:
     def __init__(
         self, source: str | None, decoder: str | None, config: PipelineConfig | None = None
     ) -> None:
-        """Take what the user said; None means each frame's file.
+        """Take what the user said; None means each frame's file, or the embedded network.
 
         Raises:
             PopError: If a named source does not exist or fits no decoder.
         """
-        self._file = _FolderFile()
+        self._file = _FolderFile(or_depth=source is None)
         self._source: KeypointDetector = self._file
         if source is not None:
             self._source = make_detector(source, decoder=decoder, json_source=self._file)
@@ -51,17 +54,23 @@ class FrameKeypoints:
 
 
 class _FolderFile:
-    """People of the file that lies beside a frame."""
+    """People of the file that lies beside a frame; of its depth, if allowed, where none does."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, or_depth: bool) -> None:
         self.folder: FrameFolder | None = None
+        self._or_depth = or_depth
+        self._depth: KeypointDetector | None = None
 
     def detect(self, frame: RgbdFrame) -> list[Detection]:
         from pop_core.keypoints.openpose_json import FileDetector
 
         assert self.folder is not None
-        if not self.folder.keypoints.is_file():
+        if self.folder.keypoints.is_file():
+            return FileDetector(self.folder.keypoints).detect(frame)
+        if not self._or_depth:
             raise SourceError(
-                f'{self.folder.path}: expected keypoints.json, or --keypoints with {SOURCES}, '
+                f'{self.folder.path}: expected keypoints.json, or other --keypoints ({SOURCES}), '
                 'found neither')
-        return FileDetector(self.folder.keypoints).detect(frame)
+        if self._depth is None:
+            self._depth = make_detector('depth')
+        return self._depth.detect(frame)

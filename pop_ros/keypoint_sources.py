@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 
     Source = KeypointDetector | BoxDetector | TopDownDetector
 
-SOURCES = "'json' (OpenPose files), the path of an ONNX network, or a name of `pop models list`"
+SOURCES = (
+    "'depth' (the embedded network), 'json' (OpenPose files), the path of an ONNX network, or a name "
+    'of `pop models list`')
 
 
 class SourceError(PopError):

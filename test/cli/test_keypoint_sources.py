@@ -132,7 +132,7 @@ def test_a_frames_own_file_is_merged_with_a_network(networks, scene, tmp_path):
 def test_a_frame_without_a_file_is_told(scene, networks, tmp_path):
     frame, _ = scene
     folder = FrameFolder(write_frame(tmp_path / 'one', frame, None), Path('one'))
-    for spec in (None, 'json', f'json,{networks["people"]}'):
+    for spec in ('json', f'json,{networks["people"]}'):
         source = FrameKeypoints(spec, None)
         source.choose(folder)
         with pytest.raises(SourceError, match=r'expected keypoints\.json'):
