@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     Source = KeypointDetector | BoxDetector | TopDownDetector
 
 SOURCES = (
-    "'depth' (the embedded network), 'json' (OpenPose files), the path of an ONNX network, or a name "
-    'of `pop models list`')
+    "'depth' (the embedded network), 'json' (OpenPose files), the path of an ONNX network, or a "
+    'name of `pop models list`')
 
 
 class SourceError(PopError):
