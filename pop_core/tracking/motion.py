@@ -17,7 +17,7 @@ from pop_core.fitting.body_state import GLOBAL_ORIENT, TRANSL
 
 N_MOVING = 3 + 3 * N_JOINTS
 # (standard deviation of the velocity [m/s, rad/s], how long it lasts [s])
-WALK, RISE = (1.0, 1.0), (0.35, 0.25)  # along the floor, up and down
+WALK, RISE = (1.0, 1.0), (0.6, 0.3)  # along the floor, up and down
 TURN = (1.5, 0.5)
 TRUNK = (0.7, 0.3)
 LIMB = (2.5, 0.25)
