@@ -99,6 +99,10 @@ def replay(
             '--loop, --step, --clock and --node-running play to a node: leave --every-frame away')
     if overlays and pictures is None:
         raise typer.BadParameter('--overlays needs a folder: name it with --pictures')
+    if rerun is not None:
+        from pop_ros.rerun_export import rerun_sdk
+
+        rerun_sdk()  # a missing one is told before the work is done
     use_large_shared_memory()
     request = ReplayRequest(
         bags=tuple(bags), out=out, ros1=ros1,

@@ -41,7 +41,7 @@ def write_rerun(scenes: Iterable[SceneFrame], f: np.ndarray, path: Path) -> int:
     Raises:
         RerunError: If the rerun SDK is not installed.
     """
-    rr = _sdk()
+    rr = rerun_sdk()
     recording = rr.RecordingStream(APPLICATION)
     recording.save(str(path))
     recording.log('/', rr.ViewCoordinates.RDF, static=True)
@@ -62,7 +62,12 @@ def write_rerun(scenes: Iterable[SceneFrame], f: np.ndarray, path: Path) -> int:
     return count
 
 
-def _sdk() -> Any:
+def rerun_sdk() -> Any:
+    """Return the module of the rerun SDK.
+
+    Raises:
+        RerunError: If it is not installed.
+    """
     try:
         import rerun
     except ModuleNotFoundError as error:
