@@ -72,5 +72,8 @@ class _FolderFile:
                 f'{self.folder.path}: expected keypoints.json, or other --keypoints ({SOURCES}), '
                 'found neither')
         if self._depth is None:
-            self._depth = make_detector('depth')
+            try:
+                self._depth = make_detector('depth')
+            except SourceError as error:
+                raise SourceError(f'{self.folder.path}: no keypoints.json; {error}') from None
         return self._depth.detect(frame)
