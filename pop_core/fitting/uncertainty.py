@@ -47,8 +47,8 @@ def joint_covariance(
     skeleton = pose_skeleton(model, parameters)
     J = joints_jacobian(model, parameters, skeleton)
     damped = hessian + 1e-6 * np.diag(np.diag(hessian)) + 1e-9 * np.eye(len(hessian))
-    factor = cho_factor(damped)
-    covariance = np.stack([Jj @ cho_solve(factor, Jj.T) for Jj in J])
+    solved = cho_solve(cho_factor(damped), J.reshape(3 * len(J), -1).T).T
+    covariance = J @ solved.reshape(J.shape).transpose(0, 2, 1)
     here = joints(model, parameters)
     for other in runners_up:
         offset = joints(model, other) - here
