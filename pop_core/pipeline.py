@@ -13,6 +13,7 @@ from pop_core.body.kinematics import joint_rotations
 from pop_core.body.model import BodyModel
 from pop_core.body.skinning import vertices
 from pop_core.config import PipelineConfig
+from pop_core.depth_noise import DepthNoise, estimate_depth_noise
 from pop_core.estimate import BodyEstimate, EstimateStatus, FrameResult
 from pop_core.fitting.body_fit import BodyFit, BodyFitter
 from pop_core.fitting.body_window import body_window
@@ -49,11 +50,13 @@ class Scene:
     Args:
         frame: The undistorted frame.
         ground: The floor, if one is seen.
+        noise: Noise of its depth.
         taken: Pixels that the people fitted so far explain.
     """
 
     frame: RgbdFrame
     ground: Ground | None
+    noise: DepthNoise
     taken: Bool[np.ndarray, 'h w']
 
 
@@ -117,8 +120,9 @@ class BodyPipeline:
         distance_m = [joints.distance_m for joints in lifted]
         with watch.step('ground'):
             ground = find_ground(frame) if self.config.use_ground else None
+            noise = estimate_depth_noise(frame.depth_m)
         statuses = [self.admit(joints) for joints in lifted]
-        scene = Scene(frame, ground, np.zeros(frame.depth_m.shape, dtype=bool))
+        scene = Scene(frame, ground, noise, np.zeros(frame.depth_m.shape, dtype=bool))
         bodies: list[BodyEstimate] = []
         for i in nearest_first(distance_m, detections):
             if statuses[i] is not EstimateStatus.OK or len(bodies) >= self.config.max_people:
@@ -146,7 +150,8 @@ class BodyPipeline:
                 return PersonFit(status)
         with watch.step('observe'):
             observation = observe(
-                scene.frame, lifted, scene.taken, scene.ground, detection.part_labels)
+                scene.frame, lifted, scene.taken, scene.ground, detection.part_labels,
+                scene.noise)
         with watch.step('retrieve'):
             candidates = self._retrieve(lifted, observation, scene.frame.camera)
         if not candidates or candidates[0].residual_m > self.config.max_residual_m:

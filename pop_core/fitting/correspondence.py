@@ -7,9 +7,10 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
 from pop_core.body.joints import N_JOINTS, PARENTS
+from pop_core.depth_noise import USUAL_NOISE, DepthNoise
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.depth_consistency import Sight, Visibility
-from pop_core.fitting.observation import Observation, sensor_sigma_m
+from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import Pairs, join_pairs, no_pairs
 from pop_core.fitting.robust_loss import geman_mcclure_weight
 
@@ -50,6 +51,7 @@ def match_points(
     points: Float[np.ndarray, 'n 3'],
     parts: Int[np.ndarray, 'n'],
     scale_m: float,
+    noise: DepthNoise = USUAL_NOISE,
 ) -> Pairs:
     """Pair every measured point with its nearest vertex that faces the camera (pi_NN of E_NN).
 
@@ -59,6 +61,7 @@ def match_points(
         points: Measured points of H [m].
         parts: Joint of the body part each point was recognised as, -1 where it was not.
         scale_m: Scale of the robust kernel [m].
+        noise: Noise of the measured depth.
     """
     facing = np.flatnonzero(visibility.facing)
     if len(facing) == 0 or len(points) == 0:
@@ -68,10 +71,12 @@ def match_points(
     worth = EFFECTIVE_POINTS * geman_mcclure_weight(distance, scale_m)
     # A point recognised as an arm never pulls on the chest it rests on.
     fits = (parts < 0) | NEAR_PARTS[parts, state.body.main_bone[vertex]]
-    return _plane_pairs(state, vertex, points, worth * fits)
+    return _plane_pairs(state, vertex, points, worth * fits, noise)
 
 
-def match_vertices(state: BodyState, visibility: Visibility, scale_m: float) -> Pairs:
+def match_vertices(
+    state: BodyState, visibility: Visibility, scale_m: float, noise: DepthNoise = USUAL_NOISE
+) -> Pairs:
     """Pair every visible vertex with the point measured at its pixel."""
     vertex = np.flatnonzero(visibility.sight == Sight.VISIBLE)
     if len(vertex) == 0:
@@ -79,7 +84,7 @@ def match_vertices(state: BodyState, visibility: Visibility, scale_m: float) -> 
     seen = state.vertices[vertex]
     target = seen * (1 + visibility.gap_m[vertex] / seen[:, 2])[:, None]
     kernel = geman_mcclure_weight(visibility.gap_m[vertex], scale_m)
-    return _plane_pairs(state, vertex, target, kernel * VERTEX_SHARE * EFFECTIVE_POINTS)
+    return _plane_pairs(state, vertex, target, kernel * VERTEX_SHARE * EFFECTIVE_POINTS, noise)
 
 
 def _plane_pairs(
@@ -87,8 +92,11 @@ def _plane_pairs(
     vertex: Int[np.ndarray, 'n'],
     target: Float[np.ndarray, 'n 3'],
     worth: Float[np.ndarray, 'n'],
+    noise: DepthNoise,
 ) -> Pairs:
-    """Return point-to-plane pairs weighted by cos(theta) / sigma^2(z), robustly.
+    """Return point-to-plane pairs weighted by cos(theta) / sigma^2(z, theta), robustly.
+
+    A sensor errs along its ray: a surface seen at a slant feels cos(theta) of that.
 
     Args:
         state: Body.
@@ -96,11 +104,12 @@ def _plane_pairs(
         target: Measured point of each pair [m].
         worth: Robust weight of each pair, times the number of independent points that all pairs
             together count for.
+        noise: Noise of the measured depth.
     """
     normal = state.normals[vertex]
     ray = target / np.linalg.norm(target, axis=1, keepdims=True)
     cosine = np.clip(-np.einsum('nc,nc->n', normal, ray), 0.1, 1.0)
-    variance = SKIN_SIGMA_M**2 + sensor_sigma_m(target[:, 2]) ** 2
+    variance = SKIN_SIGMA_M**2 + (cosine * noise.sigma_m(target[:, 2])) ** 2
     # The sensor sees cloth; the body lies under it.
     skin = target - state.body.cloth_m[vertex, None] * normal
     return Pairs(vertex, normal, skin, cosine / variance * worth / len(vertex))

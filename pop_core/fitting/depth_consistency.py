@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
 from pop_core.fitting.body_state import BodyState
-from pop_core.fitting.observation import Observation, nearest_of, sensor_sigma_m
+from pop_core.fitting.observation import Observation, nearest_of
 from pop_core.fitting.residuals import Pairs, join_pairs
 from pop_core.fitting.robust_loss import geman_mcclure_weight
 from pop_core.rendering.depth_renderer import RenderedDepth, render_depth
@@ -68,7 +68,7 @@ def see_body(state: BodyState, observation: Observation) -> Visibility:
     toward = np.einsum('nc,nc->n', state.normals, state.vertices) < 0
     hidden_by_self = ~toward | (inside & (front < z - SELF_TOLERANCE_M))
     gap = measured - z
-    margin = CLOTHES_M + 2 * sensor_sigma_m(z)
+    margin = CLOTHES_M + 2 * observation.noise.sigma_m(z)
     other = inside & ~observation.own[safe[:, 1], safe[:, 0]]
     sight = np.full(len(z), int(Sight.VISIBLE))
     with np.errstate(invalid='ignore'):

@@ -14,6 +14,7 @@ from pop_core.fitting.priors import (
     conditional_prior_residual,
     limit_prior_residual,
     pose_prior_residual,
+    scale_weight,
     shape_prior_residual,
 )
 from pop_core.fitting.residuals import (
@@ -80,6 +81,7 @@ class BodyEnergy:
         self.joint_weight = weights.joints * joint_weight(
             state, lifted, weights.robust_m, kernel)
         self.ray_weight = weights.joints * ray_weight(state, rays, kernel)
+        self.scale_weight = scale_weight(state, kernel)
 
     def residuals(self, state: BodyState, jacobian: bool) -> list[Residual]:
         """Return every block of residuals at a state."""
@@ -92,7 +94,7 @@ class BodyEnergy:
             conditional_prior_residual(
                 state, belief.pose, belief.sigma_rad, weights.neighbours, jacobian=jacobian),
             limit_prior_residual(state, jacobian=jacobian),
-            shape_prior_residual(state, jacobian=jacobian),
+            shape_prior_residual(state, self.scale_weight, jacobian=jacobian),
         ]
         if self.pairs is not None and len(self.pairs.vertex):
             blocks.append(pair_residual(state, self.pairs, jacobian=jacobian))

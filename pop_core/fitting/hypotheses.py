@@ -148,8 +148,9 @@ class HypothesisSteps:
     ) -> Pairs:
         """Return the pairs of E_NN, in both directions."""
         points, parts = thin_points(observation, segment, self.config.surface_points)
-        toward = match_points(state, visibility, points, parts, scale_m)
-        back = match_vertices(state, visibility, scale_m)
+        toward = match_points(
+            state, visibility, points, parts, scale_m, observation.noise)
+        back = match_vertices(state, visibility, scale_m, observation.noise)
         # Point to point fades as the kernel shrinks and normals can be trusted.
         tangential = tangential_pairs(toward, TANGENTIAL_SHARE * scale_m / WIDEST_M)
         return join_pairs([toward, tangential, back])

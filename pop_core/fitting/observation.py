@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
+from pop_core.depth_noise import USUAL_NOISE, DepthNoise
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.rgbd import RgbdFrame, flying_pixels
@@ -77,6 +78,7 @@ class Observation:
         lifted: Lifted joints of the person.
         keypoint_rays: Rays of the keypoints that were not lifted.
         ground: The floor, or None when none is seen.
+        noise: Noise of the measured depth.
     """
 
     window: Window
@@ -88,6 +90,7 @@ class Observation:
     lifted: LiftedJoints
     keypoint_rays: KeypointRays
     ground: Ground | None
+    noise: DepthNoise = USUAL_NOISE
 
     def points(self, mask: Bool[np.ndarray, 'h w']) -> Float[np.ndarray, 'n 3']:
         """Return the measured points of a mask [m], camera frame, in row order."""
@@ -111,17 +114,13 @@ class Observation:
         return np.where(inside, depth, np.inf), uv
 
 
-def sensor_sigma_m(depth_m: Float[np.ndarray, '*n']) -> Float[np.ndarray, '*n']:
-    """Return the standard deviation of measured depth [m] (Nguyen, Izadi and Lovell 2012)."""
-    return 0.0012 + 0.0019 * (depth_m - 0.4) ** 2
-
-
 def observe(
     frame: RgbdFrame,
     lifted: LiftedJoints,
     others: Bool[np.ndarray, 'h w'],
     ground: Ground | None = None,
     labels: Int[np.ndarray, 'h w'] | None = None,
+    noise: DepthNoise = USUAL_NOISE,
 ) -> Observation:
     """Return the observation of one person.
 
@@ -131,6 +130,7 @@ def observe(
         others: Pixels already explained by nearer people; they stay in the depth as occluders.
         ground: The floor of the scene, if one is seen.
         labels: Body part per pixel as a joint index, -1 where unknown.
+        noise: Noise of the measured depth.
     """
     window = person_window(lifted, frame.camera)
     camera = window.camera(frame.camera)
@@ -141,7 +141,8 @@ def observe(
     if ground is not None:
         own &= ~ground.floor_pixels(depth_m, rays)
     of_keypoints = keypoint_rays(lifted, frame.camera)
-    return Observation(window, camera, depth_m, rays, own, parts, lifted, of_keypoints, ground)
+    return Observation(
+        window, camera, depth_m, rays, own, parts, lifted, of_keypoints, ground, noise)
 
 
 def keypoint_rays(lifted: LiftedJoints, camera: Camera) -> KeypointRays:

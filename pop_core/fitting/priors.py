@@ -14,11 +14,13 @@ from jaxtyping import Float
 from pop_core.body.joint_limits import limit_residual
 from pop_core.fitting.body_state import BODY_POSE, BodyState, betas_slice
 from pop_core.fitting.levenberg_marquardt import Residual
+from pop_core.fitting.robust_loss import Kernel
 from pop_core.geometry.rotation import from_rotvec, left_jacobian_inverse, to_rotvec
 from pop_core.retrieval.candidate import PoseCandidate
 from pop_core.retrieval.pose_prior import PosePrior
 
 SCALE_SIGMA = 0.04  # log scale; the betas hold adults, scale is for children and giants
+SCALE_TAIL = 2.5  # in sigmas: beyond it a small body is a child, not an unlikely adult
 LIMIT_SIGMA_RAD = 0.05
 
 
@@ -74,8 +76,20 @@ def conditional_prior_residual(
     return Residual(r, J, np.full(69, weight))
 
 
-def shape_prior_residual(state: BodyState, *, jacobian: bool) -> Residual:
-    """Return betas in standard deviations and the log scale in units of its sigma."""
+def scale_weight(state: BodyState, kernel: Kernel) -> float:
+    """Return the robust weight of the scale prior: adults vary little, children much."""
+    deviation = abs(np.log(state.parameters.scale)) / SCALE_SIGMA
+    return float(kernel(np.array([deviation]), SCALE_TAIL)[0])
+
+
+def shape_prior_residual(state: BodyState, of_scale: float, *, jacobian: bool) -> Residual:
+    """Return betas in standard deviations and the log scale in units of its sigma.
+
+    Args:
+        state: Body.
+        of_scale: Weight of the scale.
+        jacobian: Whether derivatives are wanted.
+    """
     parameters, size = state.parameters, state.body.size
     n = len(parameters.betas)
     r = np.append(parameters.betas, np.log(parameters.scale) / SCALE_SIGMA)
@@ -84,7 +98,7 @@ def shape_prior_residual(state: BodyState, *, jacobian: bool) -> Residual:
         J = np.zeros((n + 1, size))
         J[:n, betas_slice(n)] = np.eye(n)
         J[n, -1] = 1 / SCALE_SIGMA
-    return Residual(r, J, np.ones(n + 1))
+    return Residual(r, J, np.append(np.ones(n), of_scale))
 
 
 def _at(state: BodyState, J: Float[np.ndarray, 'n m'], columns: slice) -> Float[np.ndarray, 'n x']:

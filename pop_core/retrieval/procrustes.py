@@ -22,14 +22,14 @@ class Similarities:
         R: Rotation (no reflection).
         t: Translation [m].
         residual_m: Weighted RMS distance after the transform [m].
-        lean_cost: Price of leaning [m^2], in the units of the squared residual.
+        prior_cost: Price of leaning and of size [m^2], in the units of the squared residual.
     """
 
     scale: Float[np.ndarray, 'n']
     R: Float[np.ndarray, 'n 3 3']
     t: Float[np.ndarray, 'n 3']
     residual_m: Float[np.ndarray, 'n']
-    lean_cost: Float[np.ndarray, 'n']
+    prior_cost: Float[np.ndarray, 'n']
 
     def apply(self, points: Float[np.ndarray, 'n k 3']) -> Float[np.ndarray, 'n k 3']:
         """Return the transformed points of each pose [m]."""
@@ -45,6 +45,7 @@ def solve_similarities(
     *,
     yaw_only: bool = False,
     upright: float = 0.0,
+    sized: float = 0.0,
 ) -> Similarities:
     """Return the weighted similarity that maps each set of points onto the target (Eq. 1).
 
@@ -60,6 +61,7 @@ def solve_similarities(
         yaw_only: Restrict rotations to turns about y.
         upright: Price [m^2] per unit of scale * |y - R y|^2 in the mean squared distance: makes
             rotations prefer turns about y.
+        sized: Price [m^2] per unit of (scale - 1)^2: few joints alone tell little of the size.
     """
     w = weight / weight.sum()
     centre = np.einsum('k,nkc->nc', w, points)
@@ -71,10 +73,11 @@ def solve_similarities(
     reach = np.einsum('nrc,nrc->n', R, cross)
     own = np.einsum('k,nkc->n', w, p**2)
     lean = upright * (1.0 - R[:, 1, 1])
-    scale = np.clip((reach - lean) / np.maximum(own, 1e-12), *scale_limits)
+    scale = np.clip((reach - lean + sized) / np.maximum(own + sized, 1e-12), *scale_limits)
     cost = w @ np.sum(q**2, axis=1) + scale * (scale * own - 2.0 * reach)
     t = middle - scale[:, None] * np.einsum('nrc,nc->nr', R, centre)
-    return Similarities(scale, R, t, np.sqrt(np.maximum(cost, 0.0)), 2.0 * scale * lean)
+    price = 2.0 * scale * lean + sized * (scale - 1.0) ** 2
+    return Similarities(scale, R, t, np.sqrt(np.maximum(cost, 0.0)), price)
 
 
 def rank_similarities(
@@ -85,9 +88,10 @@ def rank_similarities(
     *,
     yaw_only: bool = False,
     upright: float = 0.0,
+    sized: float = 0.0,
     threads: int = 2,
 ) -> Float32[np.ndarray, 'm']:
-    """Return the mean squared distance [m^2], and the price of leaning, of every pose.
+    """Return the mean squared distance [m^2], and the prices of lean and size, of every pose.
 
     Single precision, good to a millimetre: a first ranking whose best `solve_similarities`
     settles.
@@ -99,6 +103,7 @@ def rank_similarities(
         scale_limits: Smallest and largest scale.
         yaw_only: Restrict rotations to turns about y.
         upright: Price of leaning as in `solve_similarities`.
+        sized: Price of size as in `solve_similarities`.
         threads: Most threads to use.
     """
     chosen = np.flatnonzero(weight > 0)
@@ -107,6 +112,7 @@ def rank_similarities(
     arguments = (
         chosen, centred.astype(np.float32), w.astype(np.float32),
         np.asarray(scale_limits, dtype=np.float32), yaw_only, np.float32(upright),
+        np.float32(sized),
     )
     m = columns.shape[2]
     out = np.empty(m, dtype=np.float32)

@@ -18,7 +18,7 @@ SQRT3 = np.float32(1.7320508)
 
 @njit(cache=True, nogil=True, fastmath=True, error_model='numpy')
 def similarity_costs(
-    columns, chosen, target, weight, limits, yaw_only, upright, out, first, last
+    columns, chosen, target, weight, limits, yaw_only, upright, sized, out, first, last
 ):
     """Fill out[first:last] with weighted mean squared distances [m^2] after the best similarity.
 
@@ -30,12 +30,13 @@ def similarity_costs(
         limits: Smallest and largest scale (2) float32.
         yaw_only: Whether rotations are restricted to turns about y.
         upright: Cost [m^2] per unit of scale * |y - R y|^2: the price of leaning.
+        sized: Cost [m^2] per unit of (scale - 1)^2: the price of children and giants.
         out: Costs (m) float32.
         first: First pose.
         last: One past the last pose.
     """
     n = chosen.shape[0]
-    spread = np.float32(0.0)
+    spread = sized
     for k in range(n):
         for r in range(3):
             spread += weight[k] * target[k, r] * target[k, r]
@@ -64,21 +65,21 @@ def similarity_costs(
                 sums[11, i] += c * y
                 sums[12, i] += c * z
         if yaw_only:
-            _yaw_costs(sums, size, spread, limits, out[start:])
+            _yaw_costs(sums, size, spread, limits, sized, out[start:])
         else:
-            _free_costs(sums, size, spread, limits, upright, out[start:])
+            _free_costs(sums, size, spread, limits, upright, sized, out[start:])
     return out
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model='numpy')
-def _free_costs(sums, size, spread, limits, upright, out):
+def _free_costs(sums, size, spread, limits, upright, sized, out):
     """Fill costs of rotations of any axis.
 
     The price of leaning is one more correspondence, y to y, in the cross-covariance.
     """
     tiny, one, two = np.float32(1e-12), np.float32(1.0), np.float32(2.0)
     for i in range(size):
-        own = sums[3, i] - sums[0, i] ** 2 - sums[1, i] ** 2 - sums[2, i] ** 2
+        own = sized + sums[3, i] - sums[0, i] ** 2 - sums[1, i] ** 2 - sums[2, i] ** 2
         a, b, c = sums[4, i], sums[5, i], sums[6, i]
         d, e, f = sums[7, i], sums[8, i] + upright, sums[9, i]
         g, h, k = sums[10, i], sums[11, i], sums[12, i]
@@ -100,19 +101,19 @@ def _free_costs(sums, size, spread, limits, upright, out):
             value = (x2 - two) * x2 + c1 * x + c0
             slope = np.float32(4.0) * x * (x2 - one) + c1
             x = x - value / (slope + np.float32(1e-6))
-        reach = x * norm - upright
+        reach = x * norm - upright + sized
         scale = min(max(reach / (own + tiny), limits[0]), limits[1])
         out[i] = max(spread + scale * (scale * own - two * reach), np.float32(0.0))
 
 
 @njit(cache=True, nogil=True, fastmath=True, error_model='numpy')
-def _yaw_costs(sums, size, spread, limits, out):
+def _yaw_costs(sums, size, spread, limits, sized, out):
     """Fill costs of rotations about y alone."""
     tiny, two = np.float32(1e-12), np.float32(2.0)
     for i in range(size):
-        own = sums[3, i] - sums[0, i] ** 2 - sums[1, i] ** 2 - sums[2, i] ** 2
+        own = sized + sums[3, i] - sums[0, i] ** 2 - sums[1, i] ** 2 - sums[2, i] ** 2
         cosine = sums[4, i] + sums[12, i]
         sine = sums[6, i] - sums[10, i]
-        reach = np.sqrt(cosine * cosine + sine * sine) + sums[8, i]
+        reach = np.sqrt(cosine * cosine + sine * sine) + sums[8, i] + sized
         scale = min(max(reach / (own + tiny), limits[0]), limits[1])
         out[i] = max(spread + scale * (scale * own - two * reach), np.float32(0.0))

@@ -32,11 +32,12 @@ Hides = Callable[[Float[np.ndarray, 'n 3']], Float[np.ndarray, 'n']]
 MIN_JOINTS = 3  # fewer points leave a turn about their line undecided
 
 
-class RotationRules(TypedDict):
+class PlacementRules(TypedDict):
     """Keyword arguments of Eq. (1)'s solvers."""
 
     yaw_only: bool
     upright: float
+    sized: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +64,9 @@ class RetrievalConfig:
         0.5, minimum=0.2, maximum=1.0, about='Smallest person, in sizes of the library body.')
     largest_scale: float = setting(
         1.25, minimum=1.0, maximum=2.0, about='Largest person, in sizes of the library body.')
+    scale_sigma: float = setting(
+        0.1, minimum=0.01, maximum=10.0,
+        about='How much people differ in size from the library body; few noisy joints tell less.')
     lean_sigma_deg: float = setting(
         10.0, unit='deg', minimum=0.0, maximum=90.0,
         about='Where gravity is known: how far poses may lean from upright; 0 allows turns only.')
@@ -104,14 +108,14 @@ def retrieve(
     weight = np.zeros(len(seen))
     weight[seen] = 1.0 / (lifted.sigma_m[seen] ** 2 + config.pose_sigma_m**2)
     R_camera_up = _upright_frame(gravity)
-    rules = _rotation_rules(gravity is not None, weight, config)
+    rules = _placement_rules(gravity is not None, weight, config)
     shortlist = _shortlist(library, lifted, weight, config, R_camera_up, rules)
     joints = np.asarray(library.joints[shortlist], dtype=np.float64)
     placed = solve_similarities(
         joints[:, seen], lifted.positions_camera[seen] @ R_camera_up, weight[seen],
         (config.smallest_scale, config.largest_scale), **rules)
     joints_camera = placed.apply(joints) @ R_camera_up.T
-    energy = (placed.residual_m**2 + placed.lean_cost) * weight.sum()
+    energy = (placed.residual_m**2 + placed.prior_cost) * weight.sum()
     energy -= 2.0 * np.log(library.weights[shortlist])
     energy += hidden_energy(joints_camera, lifted, config, hides, camera)
     chosen, belief = choose_diverse(joints_camera, energy, ~seen, config)
@@ -194,7 +198,7 @@ def _shortlist(
     weight: Float[np.ndarray, 's'],
     config: RetrievalConfig,
     R_camera_up: Float[np.ndarray, '3 3'],
-    rules: RotationRules,
+    rules: PlacementRules,
 ) -> Int[np.ndarray, 'k']:
     """Return the best poses by Eq. (1), best first."""
     costs: Float32[np.ndarray, 'm'] = rank_similarities(
@@ -209,17 +213,22 @@ def _shortlist(
     return best[np.isfinite(costs[best])]
 
 
-def _rotation_rules(
+def _placement_rules(
     known_gravity: bool, weight: Float[np.ndarray, 's'], config: RetrievalConfig
-) -> RotationRules:
-    """Return how rotations are restricted."""
-    sigma = np.deg2rad(config.lean_sigma_deg)
-    if not known_gravity:
-        return {'yaw_only': False, 'upright': 0.0}
-    if sigma == 0.0:
-        return {'yaw_only': True, 'upright': 0.0}
-    # (angle / sigma)^2 in the energy, which is the mean squared distance times the weights' sum.
-    return {'yaw_only': False, 'upright': float(1.0 / (sigma**2 * weight.sum()))}
+) -> PlacementRules:
+    """Return how rotations and sizes are restricted.
+
+    A price is (deviation / sigma)^2 in the energy, which is the mean squared distance times the
+    weights' sum.
+    """
+    per_energy = 1.0 / weight.sum()
+    lean = np.deg2rad(config.lean_sigma_deg)
+    leans = known_gravity and lean > 0.0
+    return {
+        'yaw_only': known_gravity and not leans,
+        'upright': float(per_energy / lean**2) if leans else 0.0,
+        'sized': float(per_energy / config.scale_sigma**2),
+    }
 
 
 def _upright_frame(gravity: Float[np.ndarray, '3'] | None) -> Float[np.ndarray, '3 3']:

@@ -72,7 +72,8 @@ class Follower:
         """
         start = self._body(track.filter)
         observation = observe_track(
-            scene.frame, scene.ground, scene.taken, start, track.joint_state, lifted)
+            scene.frame, scene.ground, scene.taken, start, track.joint_state, lifted,
+            noise=scene.noise)
         visibility = see_body(start, observation)
         if sighting(visibility).seen < MIN_SEEN and lifted is None:
             return self._coast(track, scene, start, visibility)

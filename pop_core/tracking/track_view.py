@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from pop_core.body.joints import N_SHARED, SHARED
+from pop_core.depth_noise import DepthNoise
 from pop_core.estimate import JointState
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.body_window import body_window
@@ -20,12 +21,14 @@ WINDOW_PX = 200  # longest side of the thinned window
 def observe_track(
     frame: RgbdFrame, ground: Ground | None, others: Bool[np.ndarray, 'h w'],
     predicted: BodyState, joint_state: np.ndarray, lifted: LiftedJoints | None,
+    *, noise: DepthNoise,
 ) -> Observation:
     """Return the observation of a tracked person.
 
     Args:
         frame: The undistorted frame.
         ground: The floor, if one is seen.
+        noise: Noise of the measured depth.
         others: Pixels that nearer people explain.
         predicted: Where the person should be.
         joint_state: A JointState per joint, of the last frame.
@@ -44,10 +47,10 @@ def observe_track(
     if lifted is None:
         return Observation(
             window, camera, depth_m, rays, own, None, seen_joints(predicted, joint_state),
-            _no_rays(), ground)
+            _no_rays(), ground, noise)
     return Observation(
         window, camera, depth_m, rays, own, None, lifted, keypoint_rays(lifted, frame.camera),
-        ground)
+        ground, noise)
 
 
 def seen_joints(predicted: BodyState, joint_state: np.ndarray) -> LiftedJoints:

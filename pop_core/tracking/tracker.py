@@ -8,6 +8,7 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from pop_core.body.joints import SHARED
+from pop_core.depth_noise import USUAL_NOISE, estimate_depth_noise
 from pop_core.estimate import (
     BodyEstimate,
     EstimateStatus,
@@ -46,6 +47,7 @@ class BodyTracker:
         self._tracks: list[PersonTrack] = []
         self._last: tuple[Camera, int] | None = None
         self._ground: Ground | None = None
+        self._noise = USUAL_NOISE
         self.configure(pipeline, config or TrackingConfig())
 
     def configure(self, pipeline: BodyPipeline, config: TrackingConfig) -> None:
@@ -104,6 +106,7 @@ class BodyTracker:
                 seen, [undistort_detection(d, frame.camera) for d in detections])
         with watch.step('ground'):
             self._ground = find_ground(seen) if self.pipeline.config.use_ground else None
+            self._noise = estimate_depth_noise(seen.depth_m)
         return found
 
     def _track(
@@ -117,7 +120,8 @@ class BodyTracker:
             expected = [self._expected(track) for track in self._tracks]
             matches = associate(
                 expected, found.detections, found.lifted, self.config.gate_m)
-        scene = Scene(frame, self._ground, np.zeros(frame.depth_m.shape, dtype=bool))
+        scene = Scene(
+            frame, self._ground, self._noise, np.zeros(frame.depth_m.shape, dtype=bool))
         bodies: list[BodyEstimate] = []
         for row in np.argsort([t.filter.parameters.transl[2] for t in self._tracks]).tolist():
             track, index = self._tracks[row], matches.get(row)

@@ -26,7 +26,7 @@ from pop_core.fitting.levenberg_marquardt import (
     cost_of,
     levenberg_marquardt_step,
 )
-from pop_core.fitting.observation import Observation, sensor_sigma_m
+from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import Pairs, join_pairs
 from pop_core.tracking.body_filter import FilterState, update
 from pop_core.tracking.tracked_energy import Curvature, Prediction, TrackedEnergy
@@ -124,7 +124,7 @@ class WarmStart:
         scales_m = np.hypot(
             np.geomspace(
                 WIDEST_M if surprised else WIDE_M, NARROWEST_M, steps + EXTRA_STEPS * surprised),
-            NOISE_SIGMAS * sensor_sigma_m(state.joints[:1, 2]))
+            NOISE_SIGMAS * observation.noise.sigma_m(state.joints[:1, 2]))
         damping = FIRST_DAMPING
         active = np.ones(state.body.size, dtype=bool)
         visibility = see_body(state, observation)

@@ -82,7 +82,7 @@ def test_limit_prior(state: BodyState) -> None:
 
 
 def test_shape_prior(state: BodyState) -> None:
-    assert_is_derivative(lambda s, j: shape_prior_residual(s, jacobian=j), state)
+    assert_is_derivative(lambda s, j: shape_prior_residual(s, 0.3, jacobian=j), state)
 
 
 def test_joint_term_vanishes_at_the_lifted_joints(

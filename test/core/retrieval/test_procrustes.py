@@ -100,9 +100,21 @@ def test_the_price_of_leaning_is_what_both_solvers_say():
     weight = np.ones(15)
     exact = solve_similarities(points, target, weight, LIMITS, upright=0.05)
     fast = _rank(points, target, weight, upright=0.05)
-    assert np.allclose(np.sqrt(fast), np.sqrt(exact.residual_m**2 + exact.lean_cost), atol=1e-3)
+    assert np.allclose(np.sqrt(fast), np.sqrt(exact.residual_m**2 + exact.prior_cost), atol=1e-3)
     up = exact.R[:, :, 1] - [0.0, 1.0, 0.0]
-    assert np.allclose(exact.lean_cost, 0.05 * exact.scale * np.sum(up**2, axis=1))
+    assert np.allclose(exact.prior_cost, 0.05 * exact.scale * np.sum(up**2, axis=1))
+
+
+def test_the_price_of_size_is_what_both_solvers_say_and_pulls_toward_one():
+    points = cloud(300)
+    target = 0.6 * points[3] + [0.0, 0.0, 2.0]
+    free = solve_similarities(points, target, np.ones(15), LIMITS)
+    exact = solve_similarities(points, target, np.ones(15), LIMITS, sized=0.1)
+    fast = _rank(points, target, np.ones(15), sized=0.1)
+    assert np.allclose(np.sqrt(fast), np.sqrt(exact.residual_m**2 + exact.prior_cost), atol=1e-3)
+    assert np.allclose(exact.prior_cost, 0.1 * (exact.scale - 1) ** 2)
+    assert np.all(exact.scale >= free.scale)
+    assert free.scale[3] < exact.scale[3] < 1.0
 
 
 def test_a_high_price_of_leaning_equals_turns_about_y():
