@@ -16,7 +16,7 @@ from pop_core.training.curves import save_curves
 from pop_core.training.scene_pool import ScenePool
 from pop_core.training.scene_stream import SceneStream
 from pop_core.training.scene_writer import SHARD_SCENES
-from pop_core.training.shards import load_shard, shard_paths
+from pop_core.training.shards import Shard, ShardError, load_shard, shard_paths
 from pop_core.training.targets import Batch, make_targets
 from pop_core.training.trainer import Trainer
 from pop_core.training.validation import MapScores
@@ -71,10 +71,12 @@ def train(trainer: Trainer, config: RunConfig, say: Callable[[str], None]) -> No
 
 
 def validate(trainer: Trainer, config: RunConfig) -> dict[str, float]:
-    """Return the figures of the averaged network on the validation scenes."""
+    """Return the figures of the averaged network on the validation scenes, none without any."""
+    if config.validation is None:
+        return {}
     scores = MapScores()
-    for path in shard_paths(config.validation) if config.validation else ():
-        shard = load_shard(path)
+    for path in shard_paths(config.validation):
+        shard = _fitting(path, config.size)
         pool = ScenePool(len(shard), torch.device('cpu'))
         pool.add(shard)
         for start in range(0, pool.count, VALIDATION_BATCH):
@@ -145,7 +147,8 @@ def _record(
     history = json.dumps(trainer.history, indent=1)
     (config.out / 'history.json').write_text(history + '\n', encoding='utf-8')
     save_curves(trainer.history, config.out / 'curves.png')
-    say('validation: ' + ', '.join(f'{name} {value:.3f}' for name, value in figures.items()))
+    if figures:
+        say('validation: ' + ', '.join(f'{name} {value:.3f}' for name, value in figures.items()))
 
 
 def _filled(
@@ -158,7 +161,7 @@ def _filled(
         capacity = min(capacity, SHARD_SCENES * len(paths))
     pool = ScenePool(capacity, device)
     for path in paths[-(capacity // SHARD_SCENES):]:
-        pool.add(load_shard(path))
+        pool.add(_fitting(path, config.size))
     while config.scenes is None and pool.count < FIRST_SCENES:
         piece = stream.take(timeout_s=300.0)
         if piece is None:
@@ -166,6 +169,21 @@ def _filled(
         pool.add(piece)
     say(f'{pool.count} scenes to begin with')
     return pool
+
+
+def _fitting(path: Path, size: tuple[int, int]) -> Shard:
+    """Return the scenes of a file.
+
+    Raises:
+        ShardError: If they are smaller than the network's input.
+    """
+    shard = load_shard(path)
+    height, width = shard.depth_mm.shape[1:]
+    if width < size[0] or height < size[1]:
+        raise ShardError(
+            f'{path}: expected scenes of at least {size[0]}x{size[1]}, found {width}x{height}: '
+            'draw them with the same --size')
+    return shard
 
 
 def _middle(batch: Batch, size: tuple[int, int]) -> Batch:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pop_core.keypoints.onnx_session import load_network as load_onnx
-from pop_core.training.shards import pack, save_shard
+from pop_core.training.shards import ShardError, pack, save_shard
 
 torch = pytest.importorskip('torch')
 
@@ -201,3 +201,10 @@ def test_weights_of_another_size_are_told(tmp_path):
     other = Trainer(torch.device('cpu'))
     with pytest.raises(CheckpointError, match='expected weights of a network'):
         other.load(tmp_path / 'a.pt')
+
+
+def test_scenes_smaller_than_the_networks_input_are_told(small_scenes, tmp_path):
+    save_shard(pack(small_scenes[:2]), tmp_path / 'scenes' / 'a.npz')
+    run = RunConfig(tmp_path / 'run', 0.01, size=(192, 160), scenes=tmp_path / 'scenes')
+    with pytest.raises(ShardError, match='at least 192x160, found 112x80'):
+        train(trainer(), run, lambda _: None)
