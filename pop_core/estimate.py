@@ -76,7 +76,7 @@ class BodyEstimate:
         joint_rotations: Orientation of each joint's frame in the camera frame.
         joint_state: A JointState per joint.
         joint_covariance: Covariance of each joint's position [m^2].
-        mask: Pixels of the frame that show this person (the paper's H).
+        mask: Pixels of the frame that show this person: the paper's H, and holes in its depth.
         score: Confidence 0..1 that this is a person fitted right.
         energies: Final energies by name.
         runners_up: Parameters of the other hypotheses, best first.

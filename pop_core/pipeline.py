@@ -34,7 +34,7 @@ from pop_core.retrieval.pose_library import PoseLibrary
 from pop_core.retrieval.pose_prior import PosePrior, load_pose_prior
 from pop_core.retrieval.retrieve import retrieve
 from pop_core.rgbd import RgbdFrame, distort_mask, undistort_frame
-from pop_core.segmentation.body_segmentation import segment_body
+from pop_core.segmentation.body_segmentation import segment_body, with_holes
 from pop_core.segmentation.depth_support import depth_support
 from pop_core.segmentation.ground import Ground, find_ground
 from pop_core.stopwatch import Stopwatch
@@ -201,12 +201,13 @@ class BodyPipeline:
         window = body_window(mesh, scene.frame.camera)
         camera, depth_m = window.camera(scene.frame.camera), window.cut(scene.frame.depth_m)
         rendered = render_depth(mesh, self.model.f, camera)
-        own = np.isfinite(depth_m) & ~window.cut(scene.taken)
+        free = ~window.cut(scene.taken)
+        own = np.isfinite(depth_m) & free
         if scene.ground is not None:
             own &= ~scene.ground.floor_pixels(depth_m, camera.ray_grid())
         mask = np.zeros(scene.taken.shape, dtype=bool)
-        window.view(mask)[:] = segment_body(
-            depth_m, rendered, own, camera.fx, self.config.segmentation)
+        segment = segment_body(depth_m, rendered, own, camera.fx, self.config.segmentation)
+        window.view(mask)[:] = with_holes(segment, ~np.isfinite(depth_m) & free, rendered)
         joints = fit.coarse.joints
         state = fitted_joint_states(self.model, joints, rendered, depth_m, camera)
         support = depth_support(depth_m, rendered, own)

@@ -62,6 +62,27 @@ def segment_body(
     return segment
 
 
+def with_holes(
+    segment: Bool[np.ndarray, 'h w'],
+    unmeasured: Bool[np.ndarray, 'h w'],
+    rendered: RenderedDepth,
+) -> Bool[np.ndarray, 'h w']:
+    """Return a segment with the holes that dark hair and cloth leave in depth.
+
+    A hole is the person's where the body covers it and it touches what was measured of them.
+
+    Args:
+        segment: Measured pixels that show the person.
+        unmeasured: Pixels without depth that nobody else explains.
+        rendered: Rendered depth of the body.
+    """
+    together = segment | (unmeasured & rendered.covered)
+    count, label = cv2.connectedComponents(together.astype(np.uint8), connectivity=4)
+    touching = np.zeros(count, dtype=bool)
+    touching[label[segment]] = True
+    return np.asarray(together & touching[label])
+
+
 def _extend(
     rendered: RenderedDepth,
 ) -> tuple[Float32[np.ndarray, 'h w'], Float32[np.ndarray, 'h w']]:

@@ -1,7 +1,7 @@
 import numpy as np
 
 from pop_core.rendering.depth_renderer import RenderedDepth
-from pop_core.segmentation.body_segmentation import SegmentationConfig, segment_body
+from pop_core.segmentation.body_segmentation import SegmentationConfig, segment_body, with_holes
 
 SHAPE = (60, 80)
 FOCAL_PX = 100.0
@@ -59,3 +59,19 @@ def test_a_body_outside_the_image_has_no_pixels() -> None:
     nothing = RenderedDepth(
         np.full(SHAPE, np.inf, dtype=np.float32), np.full(SHAPE, -1, dtype=np.int32))
     assert not segment_body(depth, nothing, EVERY, FOCAL_PX, CONFIG).any()
+
+
+def test_a_hole_in_the_person_is_the_persons_and_one_beside_it_is_not() -> None:
+    depth, rendered, truth = scene()
+    unmeasured = np.zeros(SHAPE, dtype=bool)
+    unmeasured[10:20, 36:44] = True  # dark hair
+    unmeasured[20:40, 60:70] = True  # a window of the room
+    depth[unmeasured] = np.nan
+    measured = segment_body(depth, rendered, ~unmeasured, FOCAL_PX, CONFIG)
+    assert not measured[12, 40]
+    np.testing.assert_array_equal(with_holes(measured, unmeasured, rendered), truth)
+
+
+def test_a_body_behind_nothing_measured_has_no_pixels() -> None:
+    _, rendered, _ = scene()
+    assert not with_holes(~EVERY, EVERY, rendered).any()
