@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from pop_core.geometry.camera import Camera
 from pop_core.rendering.palette import FAINT, INK, PAPER
@@ -45,7 +45,9 @@ class SceneView:
 
     def points(self, p_camera: Float[np.ndarray, 'n 3']) -> Float[np.ndarray, 'n 3']:
         """Return points in the view frame, as far off as its viewer stands."""
-        return (p_camera - self.center) @ self.R_view_camera.T + [0, 0, VIEWER_M]
+        offset = np.array([0, 0, VIEWER_M]) - self.R_view_camera @ self.center
+        # Not matmul: BLAS starts threads for so many rows, and these take longer than the work.
+        return np.einsum('nk,jk->nj', p_camera, self.R_view_camera) + offset
 
 
 def fitting_view(
@@ -87,7 +89,8 @@ def draw_scene(
         covered[index] = int(seen.sum())
     for index, body in enumerate(bodies):
         points = point_cloud(frame, body.mask)[0]
-        v, u = _thinned(*_pixels(points, view), round(POINT_SHARE * covered[index]))
+        v, u, _ = _pixels(view.points(points), view)
+        v, u = _thinned(v, u, round(POINT_SHARE * covered[index]))
         picture[v, u] = INK
     _draw_scale(picture, view)
     return picture
@@ -101,31 +104,31 @@ def _draw_points(
 ) -> None:
     """Draw measured points in their own, paled colours, the nearest to the viewer last."""
     points, uv = point_cloud(frame, np.ones(frame.depth_m.shape, dtype=bool))
-    along = view.points(points)[:, 2]
+    seen = view.points(points)
+    along = seen[:, 2]
     keep = np.ones(len(points), dtype=bool)
     if bodies:
         around = np.concatenate([view.points(body.vertices)[:, 2] for body in bodies])
         keep = (along > around.min() - SLAB_M) & (along < around.max() + SLAB_M)
-    order = np.argsort(-along[keep], kind='stable')
-    columns, rows = uv[keep][order].astype(int).T
+    v, u, inside = _pixels(seen[keep], view)
+    order = np.argsort(-along[keep][inside], kind='stable')
+    v, u = v[order], u[order]
+    columns, rows = uv[keep][inside][order].astype(int).T
     color = frame.rgb[rows, columns].astype(np.float32)
-    pale = np.rint(0.55 * color + 0.45 * np.array(PAPER)).astype(np.uint8)
-    v, u = _pixels(points[keep][order], view, clip=False)
+    pale = np.rint(0.55 * color + 0.45 * np.array(PAPER, np.float32)).astype(np.uint8)
     for dv, du in ((0, 0), (0, 1), (1, 0), (1, 1)):  # two by two pixels: single ones hardly show
-        inside = (u >= 0) & (v >= 0) & (u + du < view.camera.width) & (v + dv < view.camera.height)
-        picture[v[inside] + dv, u[inside] + du] = pale[inside]
+        picture[np.minimum(v + dv, picture.shape[0] - 1),
+                np.minimum(u + du, picture.shape[1] - 1)] = pale
 
 
 def _pixels(
-    points: Float[np.ndarray, 'n 3'], view: SceneView, *, clip: bool = True
-) -> tuple[Int[np.ndarray, 'k'], Int[np.ndarray, 'k']]:
-    """Return rows and columns of points; those outside the picture are left out when clipping."""
-    uv = np.rint(view.camera.project(view.points(points)))
-    u, v = np.nan_to_num(uv, nan=-1).astype(int).T
-    if not clip:
-        return v, u
-    inside = (u >= 0) & (v >= 0) & (u < view.camera.width) & (v < view.camera.height)
-    return v[inside], u[inside]
+    seen: Float[np.ndarray, 'n 3'], view: SceneView
+) -> tuple[Int[np.ndarray, 'k'], Int[np.ndarray, 'k'], Bool[np.ndarray, 'n']]:
+    """Return rows and columns of points of the view frame, and which are inside the picture."""
+    uv = np.nan_to_num(np.rint(view.camera.project(seen)), nan=-1)
+    inside = ((uv >= 0) & (uv < [view.camera.width, view.camera.height])).all(axis=1)
+    u, v = uv[inside].astype(int).T
+    return v, u, inside
 
 
 def _thinned(
