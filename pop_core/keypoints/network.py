@@ -9,6 +9,7 @@ from typing import ClassVar, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Shaped, UInt8
 
+from pop_core.errors import NetworkShapeError
 from pop_core.keypoints.boxes import PersonBox
 from pop_core.keypoints.detection import Detection
 
@@ -29,6 +30,22 @@ class TensorSpec:
         """Return such as `heatmaps (1, 31, 41, 17) uint8`."""
         shape = ', '.join('?' if size is None else str(size) for size in self.shape)
         return f'{self.name} ({shape}) {self.dtype}'
+
+
+def check_grid(name: str, maps: Sequence[Tensor]) -> None:
+    """Check that maps (..., y, x) lie on one grid of two by two cells at least.
+
+    Args:
+        name: Whose maps they are.
+        maps: Outputs, rows and columns last.
+
+    Raises:
+        NetworkShapeError: If they do not.
+    """
+    grids = {array.shape[-2:] for array in maps}
+    if len(grids) > 1 or min(min(grid) for grid in grids) < 2:
+        raise NetworkShapeError(
+            f'{name}: expected maps of one grid of at least 2 x 2 cells, found {sorted(grids)}')
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,8 @@ LONGEST_S = 60.0
 FOLDING_BYTES = 2**26
 DTYPES = {
     'tensor(uint8)': 'uint8', 'tensor(int32)': 'int32', 'tensor(float)': 'float32',
-    'tensor(float16)': 'float16', 'tensor(int64)': 'int64',
+    'tensor(float16)': 'float16', 'tensor(int64)': 'int64', 'tensor(double)': 'float64',
+    'tensor(bool)': 'bool', 'tensor(int8)': 'int8',
 }
 FLOATS = ('float32', 'float16')
 # Fastest first. TensorRT is left out: it builds engines for minutes on first use.
@@ -54,6 +55,8 @@ class OnnxSession:
         self.spec = _spec(self._session)
         self.facts = dict(self._session.get_modelmeta().custom_metadata_map)
         for tensor in (*self.spec.inputs, *self.spec.outputs):
+            if tensor.dtype not in DTYPES.values():
+                raise NetworkShapeError(f'{where}: expected tensors of numbers, found {tensor}')
             if math.prod(size or 1 for size in tensor.shape) > LARGEST_TENSOR:
                 raise NetworkShapeError(
                     f'{where}: expected tensors of up to {LARGEST_TENSOR} elements, '
@@ -144,7 +147,7 @@ def _check_shape(declared: TensorSpec, array: Tensor, where: str) -> None:
     same = array.ndim == len(declared.shape) and all(
         size is None or size == found
         for size, found in zip(declared.shape, array.shape, strict=True))
-    if not same or array.size > LARGEST_TENSOR:
+    if not same or array.size > LARGEST_TENSOR or 0 in array.shape[:1]:
         raise NetworkShapeError(f'{where}: expected {declared}, found shape {array.shape}')
 
 
@@ -157,5 +160,5 @@ def _spec(session: onnxruntime.InferenceSession) -> NetworkSpec:
 
 def _tensor(item: onnxruntime.NodeArg) -> TensorSpec:
     shape = tuple(
-        size if isinstance(size, int) and size > 0 else None for size in item.shape)
+        size if isinstance(size, int) and size > 0 else None for size in item.shape or ())
     return TensorSpec(item.name, shape, DTYPES.get(item.type, item.type))

@@ -18,7 +18,7 @@ from jaxtyping import Float32, UInt8
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.keypoint_sets import BODY_25, COCO_18, KeypointSet, shared_joints
 from pop_core.keypoints.letterbox import letterbox
-from pop_core.keypoints.network import NetworkSpec, Run, Tensor, TensorSpec
+from pop_core.keypoints.network import NetworkSpec, Run, Tensor, TensorSpec, check_grid
 from pop_core.keypoints.network_input import OPENPOSE_BGR, planes, takes_planes
 from pop_core.keypoints.paf_grouping import Limb, group_people
 from pop_core.keypoints.people import detection_of
@@ -103,6 +103,7 @@ class OpenPoseDecoder:
         self, outputs: Sequence[Tensor]
     ) -> tuple[Float32[np.ndarray, 'k h w'], Float32[np.ndarray, 'c h w']]:
         """Return the heatmaps without the background, and the fields."""
+        check_grid('openpose', [outputs[self.heat], outputs[self.fields]])
         count = len(self.layout.keypoints)
         heat = outputs[self.heat][0, :count]
         first = self.layout.heat if self.heat == self.fields else 0

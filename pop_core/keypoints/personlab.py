@@ -18,7 +18,7 @@ from pop_core.keypoints import personlab_kernels as kernels
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.keypoint_sets import COCO_17, shared_joints
 from pop_core.keypoints.letterbox import letterbox
-from pop_core.keypoints.network import NetworkSpec, Run, Tensor
+from pop_core.keypoints.network import NetworkSpec, Run, Tensor, check_grid
 from pop_core.keypoints.people import detection_of
 
 # The edges of the skeleton, by COCO index, in the order of the network's channels.
@@ -101,7 +101,13 @@ class PersonLabDecoder:
 
 
 def read_maps(outputs: Sequence[Tensor], width: int) -> PersonLabMaps:
-    """Return heatmaps, short and mid offsets as values; codes are decoded where they are uint8."""
+    """Return heatmaps, short and mid offsets as values; codes are decoded where they are uint8.
+
+    Raises:
+        NetworkShapeError: If they lie on different grids.
+    """
+    # The kernels look up one map by the cells of another, and check no bounds.
+    check_grid('personlab', [output[0, ..., 0] for output in outputs])
     # What is no number decides nothing: without a score it seeds nobody.
     heat, short, mid = (
         np.nan_to_num(output[0].astype(np.float32), nan=-LARGE_PX, posinf=LARGE_PX,

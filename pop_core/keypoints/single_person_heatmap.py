@@ -17,7 +17,7 @@ from pop_core.keypoints.boxes import PersonBox
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.keypoint_sets import MPII_16, shared_joints
 from pop_core.keypoints.letterbox import letterbox
-from pop_core.keypoints.network import NetworkSpec, Run
+from pop_core.keypoints.network import NetworkSpec, Run, check_grid
 from pop_core.keypoints.network_input import IMAGENET, planes
 from pop_core.keypoints.people import detection_of
 
@@ -41,7 +41,7 @@ class SinglePersonHeatmapDecoder:
         _, height, width, _ = spec.inputs[0].shape
         self.height, self.width = int(height or 0), int(width or 0)
         rows = [
-            (o.shape[1] or 0) if len(o.shape) == 4 and o.shape[-1] == len(MPII_16) else 0
+            (o.shape[1] or 1) if len(o.shape) == 4 and o.shape[-1] == len(MPII_16) else 0
             for o in spec.outputs
         ]
         self.output = int(np.argmax(rows))
@@ -91,6 +91,7 @@ class SinglePersonHeatmapDecoder:
         image, placed = letterbox(rgb, self.height, self.width)
         tensor = np.ascontiguousarray(planes(image, IMAGENET).transpose(0, 2, 3, 1))
         heat = np.nan_to_num(run(tensor)[self.output][0].astype(np.float32))
+        check_grid(self.name, [heat[..., 0]])
         cells, peaks = heatmap_peaks(heat)
         # A map's cell covers several pixels; its centre lies in the middle of them.
         factor = np.array([self.width / heat.shape[1], self.height / heat.shape[0]])

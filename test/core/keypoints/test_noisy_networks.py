@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from spot_networks import planes_spec
 
+from pop_core.errors import NetworkShapeError
 from pop_core.keypoints.boxes import PersonBox
 from pop_core.keypoints.decoders import DECODERS, choose_decoder
 from pop_core.keypoints.fusion import fuse
@@ -68,3 +69,32 @@ def test_noise_gives_finite_people_or_nobody(name, size):
             assert np.isfinite(person.keypoints_px[seen]).all()
             assert np.isnan(person.keypoints_px[~seen]).all()
             assert person.scores.max() <= 1.0
+
+
+def free(spec):
+    """The same network with free rows and columns of its maps."""
+    outputs = tuple(
+        TensorSpec(o.name, (o.shape[0], *(None if n > 17 and n not in (26, 34, 52, 64, 78) else n
+                                          for n in o.shape[1:])), o.dtype) for o in spec.outputs)
+    return NetworkSpec(spec.inputs, outputs)
+
+
+@pytest.mark.parametrize('name', ['personlab', 'openpose', 'single_person_heatmap'])
+@pytest.mark.parametrize('grid', [(0, 0), (1, 1), (1, 40), 'mixed'])
+def test_maps_without_a_common_grid_are_refused(name, grid):
+    # Kernels look up one map by the cells of another: beyond its end lies other memory.
+    spec = SPECS[name]
+    if name == 'openpose':
+        spec = planes_spec((1, 26, 46, 62), (1, 52, 46, 62))
+    decoder = choose_decoder(free(spec), name, 'net.onnx')
+    maps = []
+    for i, output in enumerate(spec.outputs):
+        rows, columns = (30 + 5 * i, 40) if grid == 'mixed' else grid
+        first = name == 'openpose'  # channels first
+        channels = output.shape[1 if first else 3]
+        shape = (channels, rows, columns) if first else (rows, columns, channels)
+        maps.append(np.ones((1, *shape), np.float32))
+    if grid == 'mixed' and len(maps) == 1:
+        pytest.skip('one map is on one grid')
+    with pytest.raises(NetworkShapeError, match='expected maps of one grid'):
+        decoder.detect(np.zeros((48, 64, 3), np.uint8), lambda _: maps)

@@ -127,6 +127,28 @@ def test_outputs_of_another_shape_than_declared_are_told(tmp_path):
         load_network(path).run(np.zeros(SMALL, np.float32))
 
 
+def test_outputs_of_nobody_at_all_are_told(tmp_path):
+    nodes = [helper.make_node('NonZero', ['image'], ['cells']),
+             helper.make_node('Transpose', ['cells'], ['out'])]
+    path = save_graph(tmp_path / 'n.onnx', nodes, [info('out', ('n', 4), 'int64')], SMALL)
+    fails(path)
+
+
+def test_texts_are_no_outputs(tmp_path):
+    text = helper.make_tensor('t', onnx.TensorProto.STRING, [1], [b'open the door'])
+    node = helper.make_node('Constant', [], ['out'], value=text)
+    value = helper.make_tensor_value_info('out', onnx.TensorProto.STRING, [1])
+    path = save_graph(tmp_path / 'n.onnx', [node], [value], SMALL)
+    assert 'expected tensors of numbers' in refused(path)
+
+
+def test_sequences_are_no_outputs(tmp_path):
+    node = helper.make_node('SequenceConstruct', ['image'], ['out'])
+    value = helper.make_tensor_sequence_value_info('out', onnx.TensorProto.FLOAT, SMALL)
+    path = save_graph(tmp_path / 'n.onnx', [node], [value], SMALL)
+    assert 'expected tensors of numbers' in refused(path)
+
+
 def test_a_network_that_fails_on_its_input_is_told(tmp_path):
     path = save_network(tmp_path / 'n.onnx', {'out': np.zeros((1, 2), np.float32)}, SMALL,
                         'float32')
