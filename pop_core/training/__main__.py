@@ -65,7 +65,10 @@ def train_command(
         '--workers', min=0, help='Processes that draw fresh scenes meanwhile.')] = 0,
     mocap: Mocap = None,
     batch: Annotated[int, typer.Option('--batch', min=2, help='Images per step.')] = 32,
-    rate: Annotated[float, typer.Option('--rate', help='Largest learning rate.')] = 2e-3,
+    rate: Annotated[float, typer.Option(
+        '--rate', help='Largest learning rate of AdamW.')] = TrainConfig().rate,
+    matrix_rate: Annotated[float, typer.Option(
+        '--matrix-rate', help='Largest learning rate of Muon.')] = TrainConfig().matrix_rate,
     cooldown: Annotated[float, typer.Option(
         '--cooldown', min=0.0, max=1.0,
         help='Share of this run in which the rate falls to nothing: for the last run.')] = 0.0,
@@ -84,7 +87,8 @@ def train_command(
     """
     torch.set_num_threads(threads)
     chosen = device if device != 'auto' else 'cuda' if torch.cuda.is_available() else 'cpu'
-    trainer = Trainer(torch.device(chosen), _network(size), TrainConfig(batch=batch, rate=rate))
+    config = TrainConfig(batch=batch, rate=rate, matrix_rate=matrix_rate)
+    trainer = Trainer(torch.device(chosen), _network(size), config)
     if weights is not None and not (out / 'checkpoint.pt').exists():
         trainer.load(weights)
     run = RunConfig(
