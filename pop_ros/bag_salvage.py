@@ -132,6 +132,8 @@ def _walk_sqlite(path: Path) -> Iterator[SalvagedMessage]:
              'JOIN topics ON messages.topic_id = topics.id ORDER BY messages.id')
     try:
         with closing(sqlite3.connect(f'file:{quote(str(path))}?mode=ro', uri=True)) as database:
+            # SQLite then opens a file that is shorter than its first page says, too.
+            database.execute('PRAGMA writable_schema = ON')
             for row in database.execute(query):
                 yield SalvagedMessage(*row)
     except sqlite3.Error:

@@ -1,4 +1,4 @@
-"""Compressed recordings are read, and salvaged when they are cut."""
+"""Compressed recordings and databases are read, and salvaged when they are cut."""
 
 import os
 from pathlib import Path
@@ -58,4 +58,22 @@ def test_a_compressed_recording_gives_what_comes_before_the_cut(tmp_path: Path, 
         assert bag.damage
     # The chunk that is cut cannot be decompressed.
     assert 0.4 * COUNT < len(found) < COUNT
+    assert found == data[:len(found)]
+
+
+@pytest.mark.parametrize('share', [0.3, 0.7, 0.95])
+def test_a_database_that_is_cut_gives_what_comes_before_the_cut(
+    tmp_path: Path, share: float
+) -> None:
+    data = messages()
+    with Ros2Writer(tmp_path / 'a', version=9, storage_plugin=StoragePlugin.SQLITE3) as bag:
+        topic = bag.add_connection('/image', IMAGE, typestore=STORE)
+        for k, message in enumerate(data):
+            bag.write(topic, START_NS + k, message)
+    path = tmp_path / 'a' / 'a.db3'
+    os.truncate(path, int(share * path.stat().st_size))
+    with BagReader(path) as reader:
+        found = [m.data for m in reader.messages(['/image'])]
+        assert reader.damage
+    assert len(found) >= int(0.8 * share * COUNT)
     assert found == data[:len(found)]
