@@ -1,4 +1,4 @@
-"""TF frames of people, with the one message of tf2_msgs built from test/support/tf2_msgs."""
+"""TF out and in, with the one message of tf2_msgs built from test/support/tf2_msgs."""
 
 import json
 import subprocess
@@ -7,10 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseArray
+from support.camera import START_NS, STEP_NS, CameraPlan, start_camera
 from support.message_packages import environment_with
 from support.messages import FRAME_ID
 from support.node import RunningNode
+from support.player import Listener
 from support.recording import record
+
+from pop_ros.diagnostics import read_values
 
 LISTENER = '''
 import json, rclpy
@@ -64,3 +70,53 @@ def test_frames_of_a_person_stand_where_the_person_stands(tmp_path: Path) -> Non
     assert name.startswith('body_')
     assert all(frame['child'].startswith(f'{name}/') for frame in joints)
     assert np.linalg.norm(person['at'] - recording.pelvis(recording.stamps[0])) < 0.05
+
+
+BROADCASTER = '''
+import rclpy
+from geometry_msgs.msg import TransformStamped
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from tf2_msgs.msg import TFMessage
+rclpy.init()
+node = rclpy.create_node('broadcaster')
+latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+transform = TransformStamped(child_frame_id='depth')
+transform.header.frame_id = 'camera'
+transform.transform.rotation.w = 1.0
+node.create_publisher(TFMessage, '/tf_static', latched).publish(
+    TFMessage(transforms=[transform]))
+rclpy.spin(node)
+'''
+
+
+@pytest.mark.usefixtures('tf2_environment')
+def test_depth_in_a_frame_of_its_own_is_registered_once_tf_tells_where_it_is(
+    tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    plan = CameraPlan(frames=8, rate_hz=4.0, depth_frame='depth')
+    for k in range(plan.frames):
+        (tmp_path / f'{START_NS + k * STEP_NS}.json').write_text('{"version": 1.3, "people": []}')
+    values: dict[str, str] = {}
+
+    def on_report(message: DiagnosticArray) -> None:
+        values.update(read_values(message, '/pop') or {})
+
+    node = RunningNode('--keypoints', 'json', '--keypoints-dir', str(tmp_path))
+    request.addfinalizer(node.end)
+    with Listener(joints=PoseArray) as listener:
+        listener.node.create_subscription(DiagnosticArray, '/diagnostics', on_report, 10)
+        node.wait_for('ready after')
+        for told in (False, True):
+            if told:
+                broadcaster = subprocess.Popen([sys.executable, '-c', BROADCASTER])
+                request.addfinalizer(broadcaster.kill)
+                listener.spin_until(lambda: False, 3.0)
+            camera = start_camera(plan)
+            expected = str(plan.frames * (2 if told else 1))
+            assert listener.spin_until(
+                lambda wanted=expected: values.get('pairs') == wanted
+                and values['pending'] == '0', 60), values
+            assert camera.wait(20) == 0
+            assert (int(values['frames']) > 0) == told
+    assert int(values['dropped: bad message']) == plan.frames
+    assert 'no transform between them' in node.output
