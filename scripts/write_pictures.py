@@ -18,7 +18,7 @@ from pop_ros.warm_up import OnePerson
 
 WIDTH, HEIGHT, GAP = 420, 315, 6
 WALK_SEED = 8  # a table that one can look below, so that some of the legs is seen
-FRAMES, SHOWN = 16, 8
+FRAMES, SHOWN = 16, 10
 
 
 def walk_picture(scene: SyntheticScene) -> np.ndarray:

@@ -23,7 +23,7 @@ from scripts.ros1_screen import PACKAGES, Ros1Screen, missing_programs, ros1_scr
 from scripts.write_pictures import WALK_SEED
 
 CONFIG = Path(__file__).resolve().parents[1] / 'rviz' / 'pop_ros1.rviz'
-FRAMES, SHOWN = 16, 8
+FRAMES, SHOWN = 16, 10
 SIZE = (1400, 900)
 NAME = 'rviz.png'
 TOPICS = ('/pop/mesh', '/pop/joints', '/pop/cloud')
