@@ -8,7 +8,7 @@ from pop_core.estimate import TrackState
 from pop_core.tracking.track import PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
 
-LATEST_S = 0.25  # slow cameras: people move far between frames
+LATEST_S = 0.12  # slow cameras: people move far between frames
 SOON = 2  # frames from one look to the next while somebody is not followed well
 
 

@@ -49,11 +49,11 @@ class Follower:
 
     def predict(self, track: PersonTrack, now_ns: int) -> None:
         """Move a track's beliefs to the time of a frame."""
-        dt_s = (now_ns - track.now_ns) * 1e-9
+        track.gap_s = (now_ns - track.now_ns) * 1e-9
         track.now_ns = now_ns
-        track.filter = predict(track.filter, self.pipeline.model, dt_s)
+        track.filter = predict(track.filter, self.pipeline.model, track.gap_s)
         for other in track.alternatives:
-            other.filter = predict(other.filter, self.pipeline.model, dt_s)
+            other.filter = predict(other.filter, self.pipeline.model, track.gap_s)
 
     def expected(self, track: PersonTrack) -> Expected:
         """Return where a predicted person should be."""
@@ -61,7 +61,8 @@ class Follower:
         return Expected(self._body(track.filter).landmarks, doubt_m, track.mask)
 
     def follow(
-        self, track: PersonTrack, scene: Scene, lifted: LiftedJoints | None
+        self, track: PersonTrack, scene: Scene, lifted: LiftedJoints | None,
+        rival: BodyFit | None = None,
     ) -> BodyEstimate | None:
         """Return the person in a frame, or None where nothing is given out.
 
@@ -69,6 +70,7 @@ class Follower:
             track: A predicted track; moved on.
             scene: The frame, with what nearer people explain.
             lifted: The person's joints if they were detected in this frame.
+            rival: A fit that knows nothing of the track, where the prediction is in doubt.
         """
         start = self._body(track.filter)
         observation = observe_track(
@@ -78,6 +80,8 @@ class Follower:
         if sighting(visibility).seen < MIN_SEEN and lifted is None:
             return self._coast(track, scene, start, visibility)
         fit = self._fit(track, observation, lifted)
+        if rival is not None:
+            fit = self._better(track, fit, rival, observation)
         sight = sighting(fit.visibility)
         if sight.seen < MIN_SEEN or sight.contradicted > CONTRADICTED + sight.seen:
             return self._coast(track, scene, start, visibility)
@@ -86,8 +90,7 @@ class Follower:
     def restart(self, track: PersonTrack, person: PersonFit) -> None:
         """Take over a fit that began with retrieved poses; the shape stays the person's."""
         assert person.fit is not None
-        found = first_state(person.fit.parameters, person.fit.hessian)
-        track.filter = with_known_shape(found, track.filter, self.pipeline.model)
+        track.filter = self._found_anew(track, person.fit)
         self.begin(track, person)
         track.depth_level = None
 
@@ -112,6 +115,25 @@ class Follower:
             fit = follow_alternatives(
                 self.warm, track, fit, observation, self.config, detected=detected)
         return fit
+
+    def _better(
+        self, track: PersonTrack, fit: WarmFit, rival: BodyFit, observation: Observation
+    ) -> WarmFit:
+        """Return the better of what was followed and what was found anew."""
+        track.restarted_ns, track.doubts = track.now_ns, 0
+        belief = self._found_anew(track, rival)
+        other = self.warm.fit(belief, observation, self.config.steps, detected=True)
+        ours, theirs = costs(self.warm.fitter, [fit, other], observation)
+        if theirs >= ours:
+            return fit
+        track.filter, track.depth_level = belief, None
+        track.alternatives.clear()
+        return other
+
+    def _found_anew(self, track: PersonTrack, found: BodyFit) -> FilterState:
+        """Return the belief in a fresh fit of a known person: the shape stays theirs."""
+        belief = first_state(found.parameters, found.hessian)
+        return with_known_shape(belief, track.filter, self.pipeline.model)
 
     def _without_lost_limbs(
         self, track: PersonTrack, fit: WarmFit, observation: Observation, lifted: LiftedJoints

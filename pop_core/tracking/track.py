@@ -38,6 +38,7 @@ class PersonTrack:
         filter: The best explanation: body, velocities, covariances.
         born_ns: First frame with the person.
         now_ns: Frame that the belief is of.
+        gap_s: Time from the frame before it [s].
         seen_ns: Last frame in which the camera saw any of the person.
         joint_seen_ns: The same per joint.
         mask: Pixels of the person in the last frame.
@@ -63,6 +64,7 @@ class PersonTrack:
     mask: Bool[np.ndarray, 'h w']
     joint_state: Int[np.ndarray, '24']
     trust: float
+    gap_s: float = 0.0
     state: TrackState = TrackState.NEW
     hits: int = 1
     misses: int = 0

@@ -31,6 +31,7 @@ from pop_core.tracking.track import PersonTrack, new_track
 from pop_core.tracking.tracking_config import TrackingConfig
 
 STALE_S = 0.25  # unseen for longer, a person is looked for anew
+LONG_GAP_S = 0.12  # between frames: limbs go anywhere, and there is time
 MOST_DOUBTS, RESTART_EVERY_S = 2, 1.0
 MOST_MISSES = 3
 CLEARLY_SEEN = 8  # shared joints that a body claims the camera sees: a detector would find it
@@ -154,18 +155,21 @@ class BodyTracker:
         watch: Stopwatch, *, astray: bool,
     ) -> BodyEstimate | None:
         """Return a known person in this frame, or None where nothing is given out."""
-        lifted = None
+        lifted, rival = None, None
         if index is not None:
             lifted = self._finder.lifted_behind(scene, found, index)
-            if astray or _needs_restart(track):
+            elsewhere = astray or _is_stale(track)
+            if elsewhere or _is_doubtful(track):
                 with watch.step('restart'):
                     person = self._finder.fit(scene, found, index)
-                    if person.fit is not None:
-                        self._follower.restart(track, person)
+                if elsewhere and person.fit is not None:
+                    self._follower.restart(track, person)
+                else:
+                    rival = person.fit
         if track.state is TrackState.LOST and lifted is None:
             return None
         with watch.step('follow'):
-            return self._follower.follow(track, scene, lifted)
+            return self._follower.follow(track, scene, lifted, rival)
 
     def _begin(
         self, scene: Scene, found: Found, index: int, watch: Stopwatch
@@ -194,9 +198,14 @@ def same_camera(camera: Camera, other: Camera) -> bool:
         and np.array_equal(camera.K, other.K) and np.array_equal(camera.d, other.d))
 
 
-def _needs_restart(track: PersonTrack) -> bool:
-    """Return whether a body is to be looked for anew instead of followed."""
-    if track.unseen_s > STALE_S:
+def _is_stale(track: PersonTrack) -> bool:
+    """Return whether too much may have happened unseen for a prediction to be of use."""
+    return track.unseen_s - track.gap_s > STALE_S
+
+
+def _is_doubtful(track: PersonTrack) -> bool:
+    """Return whether a prediction should be compared with a body found anew."""
+    if track.gap_s > LONG_GAP_S:
         return True
     since_s = (track.now_ns - track.restarted_ns) * 1e-9
     return track.doubts >= MOST_DOUBTS and since_s > RESTART_EVERY_S
