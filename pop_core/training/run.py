@@ -163,10 +163,9 @@ def _filled(
     for path in paths[-(capacity // SHARD_SCENES):]:
         pool.add(_fitting(path, config.size))
     while config.scenes is None and pool.count < FIRST_SCENES:
-        piece = stream.take(timeout_s=300.0)
-        if piece is None:
-            raise TimeoutError('expected scenes of the workers within five minutes, found none')
-        pool.add(piece)
+        piece = stream.take(timeout_s=5.0)
+        if piece is not None:
+            pool.add(piece)
     say(f'{pool.count} scenes to begin with')
     return pool
 

@@ -11,7 +11,7 @@ from pop_core.body.default_body import default_body
 from pop_core.synthesis.coarse_body import coarse_body
 from pop_core.synthesis.training_scenes import TrainingScenes
 from pop_core.training.scene_writer import MARGIN_PX, load_motions
-from pop_core.training.shards import Shard, pack
+from pop_core.training.shards import Shard, ShardError, pack
 
 if TYPE_CHECKING:
     from types import TracebackType
@@ -59,10 +59,19 @@ class SceneStream:
             worker.join()
 
     def take(self, timeout_s: float | None = None) -> Shard | None:
-        """Return a piece of scenes; None when none came in time (at once without a timeout)."""
+        """Return a piece of scenes; None when none came in time (at once without a timeout).
+
+        Raises:
+            ShardError: If a process has ended, which none does by itself.
+        """
         try:
             piece: Shard = self._queue.get(block=timeout_s is not None, timeout=timeout_s)
         except Empty:
+            ended = [worker.exitcode for worker in self._workers if not worker.is_alive()]
+            if ended:
+                raise ShardError(
+                    f'expected {len(self._workers)} processes that draw scenes, found {len(ended)} '
+                    f'ended with {ended}: their own messages stand above') from None
             return None
         return piece
 

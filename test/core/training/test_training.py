@@ -19,6 +19,7 @@ from pop_core.training.network import (  # noqa: E402
 )
 from pop_core.training.run import RunConfig, train, validate  # noqa: E402
 from pop_core.training.scene_pool import ScenePool  # noqa: E402
+from pop_core.training.scene_stream import SceneStream  # noqa: E402
 from pop_core.training.targets import make_targets  # noqa: E402
 from pop_core.training.trainer import (  # noqa: E402
     CheckpointError,
@@ -208,3 +209,11 @@ def test_scenes_smaller_than_the_networks_input_are_told(small_scenes, tmp_path)
     run = RunConfig(tmp_path / 'run', 0.01, size=(192, 160), scenes=tmp_path / 'scenes')
     with pytest.raises(ShardError, match='at least 192x160, found 112x80'):
         train(trainer(), run, lambda _: None)
+
+
+def test_processes_that_end_are_told(tmp_path):
+    missing = tmp_path / 'no_motions.npz'
+    with SceneStream(1, 0, SIZE, 80.0, missing) as stream, pytest.raises(
+            ShardError, match='1 ended'):
+        for _ in range(20):
+            stream.take(timeout_s=3.0)
