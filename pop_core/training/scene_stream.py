@@ -70,8 +70,8 @@ class SceneStream:
             ended = [worker.exitcode for worker in self._workers if not worker.is_alive()]
             if ended:
                 raise ShardError(
-                    f'expected {len(self._workers)} processes that draw scenes, found {len(ended)} '
-                    f'ended with {ended}: their own messages stand above') from None
+                    f'expected {len(self._workers)} processes that draw scenes, found '
+                    f'{len(ended)} ended with {ended}: their own messages stand above') from None
             return None
         return piece
 

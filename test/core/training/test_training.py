@@ -211,9 +211,12 @@ def test_scenes_smaller_than_the_networks_input_are_told(small_scenes, tmp_path)
         train(trainer(), run, lambda _: None)
 
 
+def take_many(stream):
+    for _ in range(20):
+        stream.take(timeout_s=3.0)
+
+
 def test_processes_that_end_are_told(tmp_path):
-    missing = tmp_path / 'no_motions.npz'
-    with SceneStream(1, 0, SIZE, 80.0, missing) as stream, pytest.raises(
-            ShardError, match='1 ended'):
-        for _ in range(20):
-            stream.take(timeout_s=3.0)
+    with SceneStream(1, 0, SIZE, 80.0, tmp_path / 'no_motions.npz') as stream:
+        with pytest.raises(ShardError, match='1 ended'):
+            take_many(stream)
