@@ -217,6 +217,6 @@ def take_many(stream):
 
 
 def test_processes_that_end_are_told(tmp_path):
-    with SceneStream(1, 0, SIZE, 80.0, tmp_path / 'no_motions.npz') as stream:
-        with pytest.raises(ShardError, match='1 ended'):
-            take_many(stream)
+    stream = SceneStream(1, 0, SIZE, 80.0, tmp_path / 'no_motions.npz')
+    with stream, pytest.raises(ShardError, match='1 ended'):
+        take_many(stream)
