@@ -17,7 +17,7 @@ from pop_core.rendering.shown_body import ShownBody, body_color
 
 OPACITY, HIDDEN_OPACITY = 0.74, 0.34
 HIDDEN_M = 0.12  # so far behind what was measured: noise and the error of a fit are smaller
-EXPOSURE = 1.3  # of the mesh, which would look dull over a bright photograph
+EXPOSURE = 1.2  # of the mesh, which would look dull over a photograph; more shifts its hue
 SHIFT = 4  # fractional bits of cv2's coordinates: joints are drawn where they are
 AROUND_JOINT_M = 0.024
 HEAD = JOINT_INDEX['head']
