@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from pop_core.body.default_body import default_body
-from pop_core.body.model import BodyModel
 from pop_core.errors import PopError
 from pop_core.estimate import JointState
 from pop_core.keypoints.openpose_json import write_openpose_json
-from pop_core.rendering.pictures import four_panels
+from pop_core.rendering.pictures import extent_of, four_panels
+from pop_core.rendering.shown_body import ShownBody
 from pop_core.synthesis.scenes import SyntheticScene
 from pop_core.synthesis.sequence import synthesise_sequence
 from pop_ros.frame_bag import write_frame_bag
@@ -136,13 +136,16 @@ def draw_frames(
     recorded = read_bodies(paths.bodies_bag)
     model = default_body()
     paths.pictures.mkdir()
-    frames = []
+    frames, extent = [], np.zeros((0, 3))
     for number, scene in enumerate(scenes):
         progress()
         published = recorded.get(scene.frame.stamp_ns)
         if published is None or not len(published.joints):
             continue
-        frame = _draw_frame(scene, published, model)
+        bodies = shown_bodies(published, scene.frame, model)
+        extent = np.concatenate([extent, extent_of(bodies)])
+        frame = _demo_frame(scene, published, bodies, four_panels(
+            scene.frame, bodies, model.f, extent))
         write_png(paths.pictures / f'frame_{number:03d}.png', frame.picture)
         frames.append(frame)
     if not frames:
@@ -150,11 +153,10 @@ def draw_frames(
     return frames
 
 
-def _draw_frame(
-    scene: SyntheticScene, published: RecordedFrame, model: BodyModel
+def _demo_frame(
+    scene: SyntheticScene, published: RecordedFrame, bodies: Sequence[ShownBody],
+    picture: np.ndarray,
 ) -> DemoFrame:
-    bodies = shown_bodies(published, scene.frame, model)
-    picture = four_panels(scene.frame, bodies, model.f)
     truth = scene.people[0]
     to_pelvis = np.linalg.norm(published.joints[:, PELVIS] - truth.joints[PELVIS], axis=1)
     nearest = published.joints[int(to_pelvis.argmin())]

@@ -12,7 +12,7 @@ from pop_core import __version__
 from pop_core.body.model import BodyModel
 from pop_core.errors import PopError
 from pop_core.estimate import JointState
-from pop_core.rendering.pictures import four_panels
+from pop_core.rendering.pictures import extent_of, four_panels
 from pop_core.rendering.shown_body import ShownBody
 from pop_core.rendering.summary_film import SummaryFilm
 from pop_core.rgbd import RgbdFrame
@@ -93,10 +93,12 @@ def show_recording(
     request.out.mkdir(parents=True, exist_ok=True)
     film_path, page = request.out / request.film, request.out / 'report.html'
     scenes, pictures = Evenly[SceneFrame](MAX_SCENES), Evenly[Picture](MAX_PICTURES)
-    counts = _Counts()
+    counts, extent = _Counts(), np.zeros((0, 3))
     with SummaryFilm(film_path, FILM_HZ) as film:
         for scene in read_scenes(request, model):
-            picture = four_panels(scene.frame, scene.bodies, model.f)
+            # The views widen as people walk; they do not jump from frame to frame.
+            extent = np.concatenate([extent, extent_of(scene.bodies)])
+            picture = four_panels(scene.frame, scene.bodies, model.f, extent)
             film.add(picture)
             if request.overlays:
                 _write_overlay(request.out / 'overlays', scene, picture)

@@ -19,7 +19,7 @@ from pop_core.fitting.fit_trace import TracedSteps
 from pop_core.keypoints.detection import Detection
 from pop_core.pipeline import BodyPipeline
 from pop_core.rendering.heat_map import heat_map
-from pop_core.rendering.pictures import result_panels
+from pop_core.rendering.pictures import extent_of, result_panels
 from pop_core.rendering.shown_body import ShownBody, shown
 from pop_core.rendering.summary_film import SummaryFilm
 from pop_core.rgbd import RgbdFrame
@@ -51,13 +51,15 @@ def write_walk(folder: Path, pipeline: BodyPipeline, source: SceneKeypoints) -> 
     """Write the film of a walk and the 3D view of its middle."""
     scenes = synthesise_sequence(default_body(), WALK_SEED, WALK_FRAMES, rate_hz=RATE_HZ)
     fitted: list[tuple[SyntheticScene, list[ShownBody]]] = []
+    for scene in scenes:
+        source.scene = scene
+        bodies = [shown(body) for body in pipeline.process(scene.frame).bodies]
+        fitted.append((scene, bodies))
+    extent = np.concatenate([extent_of(bodies) for _, bodies in fitted])
     with SummaryFilm(folder / 'walk.webp', RATE_HZ, width=680) as film:
-        for scene in scenes:
-            source.scene = scene
-            bodies = [shown(body) for body in pipeline.process(scene.frame).bodies]
-            _, _, fit, views = result_panels(scene.frame, bodies, pipeline.model.f)
+        for scene, bodies in fitted:
+            _, _, fit, views = result_panels(scene.frame, bodies, pipeline.model.f, extent)
             film.add(np.concatenate([fit, views], axis=1))
-            fitted.append((scene, bodies))
     scene, bodies = fitted[WALK_FRAMES // 2]
     write_view(folder / 'view3d.jpg', SceneFrame(scene.frame, bodies, ''), pipeline.model.f)
 

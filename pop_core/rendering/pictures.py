@@ -28,16 +28,25 @@ def result_picture(
 
 
 def four_panels(
-    frame: RgbdFrame, bodies: Sequence[ShownBody], f: Int[np.ndarray, 'm 3']
+    frame: RgbdFrame, bodies: Sequence[ShownBody], f: Int[np.ndarray, 'm 3'],
+    extent: Float[np.ndarray, 'n 3'] | None = None,
 ) -> UInt8[np.ndarray, 'h w 3']:
-    """Return colour, depth, overlay, and side and top view, two by two."""
-    colour, depth, overlay, views = result_panels(frame, bodies, f)
+    """Return colour, depth, overlay, and side and top view, two by two.
+
+    Args:
+        frame: What the camera measured.
+        bodies: The people in it.
+        f: Triangles of their meshes.
+        extent: Points that side and top view contain too [m], so that those of a film agree.
+    """
+    colour, depth, overlay, views = result_panels(frame, bodies, f, extent)
     rows = [_beside(colour, depth), _beside(overlay, views)]
     return np.concatenate([rows[0], _gap(GAP_PX, rows[0].shape[1]), rows[1]])
 
 
 def result_panels(
-    frame: RgbdFrame, bodies: Sequence[ShownBody], f: Int[np.ndarray, 'm 3']
+    frame: RgbdFrame, bodies: Sequence[ShownBody], f: Int[np.ndarray, 'm 3'],
+    extent: Float[np.ndarray, 'n 3'] | None = None,
 ) -> list[UInt8[np.ndarray, 'h w 3']]:
     """Return the captioned panels colour, depth, overlay and views, all of the frame's size.
 
@@ -51,15 +60,26 @@ def result_panels(
         captioned(seen.rgb, 'colour'),
         captioned(colored_depth(seen.depth_m), 'depth'),
         captioned(overlay, f'fit: {count} {"person" if count == 1 else "people"}'),
-        _views(seen, people, f),
+        _views(seen, people, f, extent),
     ]
 
 
+def extent_of(bodies: Sequence[ShownBody]) -> Float[np.ndarray, 'n 3']:
+    """Return the corners of the box around people [m]; none without any."""
+    if not bodies:
+        return np.zeros((0, 3))
+    everyone = np.concatenate([body.vertices for body in bodies])
+    return np.array([everyone.min(axis=0), everyone.max(axis=0)])
+
+
 def _views(
-    frame: RgbdFrame, bodies: Sequence[ShownBody], f: Int[np.ndarray, 'm 3']
+    frame: RgbdFrame, bodies: Sequence[ShownBody], f: Int[np.ndarray, 'm 3'],
+    extent: Float[np.ndarray, 'n 3'] | None,
 ) -> UInt8[np.ndarray, 'h w 3']:
     """Return the side view beside the top view, in one panel of the frame's size."""
-    shown = _points_to_show(frame, bodies)
+    shown = extent_of(bodies) if extent is None else np.concatenate([extent, extent_of(bodies)])
+    if not len(shown):
+        shown = _extent_of_scene(frame)
     height, width = frame.depth_m.shape
     left = (width - GAP_PX) // 2
     side = fitting_view(FROM_THE_RIGHT, shown, left, height)
@@ -69,12 +89,8 @@ def _views(
         captioned(draw_scene(frame, bodies, f, top), 'from above'))
 
 
-def _points_to_show(
-    frame: RgbdFrame, bodies: Sequence[ShownBody]
-) -> Float[np.ndarray, 'n 3']:
-    """Return what the views must contain [m]: the people, or the whole cloud without any."""
-    if bodies:
-        return np.concatenate([body.vertices for body in bodies])
+def _extent_of_scene(frame: RgbdFrame) -> Float[np.ndarray, '2 3']:
+    """Return the corners of the box around most of what was measured [m]."""
     cloud = point_cloud(frame, np.ones(frame.depth_m.shape, dtype=bool))[0]
     if not len(cloud):
         return np.array([[-1.0, -1, 1], [1, 1, 3]])

@@ -10,7 +10,12 @@ from pop_core.geometry.camera import Camera
 from pop_core.rendering.depth_renderer import render_depth
 from pop_core.rendering.overlay import draw_people, draw_skeleton
 from pop_core.rendering.palette import INK, PAPER, person_color
-from pop_core.rendering.pictures import result_picture, undistorted_mask
+from pop_core.rendering.pictures import (
+    extent_of,
+    result_panels,
+    result_picture,
+    undistorted_mask,
+)
 from pop_core.rendering.scene_view import FROM_ABOVE, FROM_THE_RIGHT, draw_scene, fitting_view
 from pop_core.rendering.shading import shade
 from pop_core.rendering.shown_body import ShownBody
@@ -177,6 +182,22 @@ def test_a_scene_without_people_or_depth_still_gives_a_picture():
     frame = plain_frame(np.nan)
     picture = result_picture(frame, FrameResult((), (), {}), np.zeros((0, 3), dtype=int))
     assert picture.shape[2] == 3
+
+
+def test_views_of_one_extent_are_to_one_scale_wherever_people_are():
+    near, far = body(1.5), body(3.5)
+    frame, f = plain_frame(np.nan), near[1]
+    extent = np.concatenate([extent_of([near[0]]), extent_of([far[0]])])
+    half = CAMERA.width // 2
+
+    def mesh_px(shown, points):
+        views = result_panels(frame, [shown], f, points)[3]
+        side = views[30:90, : half - 4].astype(int)  # without caption and scale
+        return (np.ptp(side, axis=2) > 40).sum()
+
+    alike = [mesh_px(shown, extent) for shown in (near[0], far[0])]
+    assert abs(alike[0] - alike[1]) < 0.1 * alike[0]
+    assert mesh_px(near[0], None) > 1.5 * alike[0]
 
 
 def test_a_view_of_a_body_shows_its_mesh():
