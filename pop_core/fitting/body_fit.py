@@ -16,6 +16,7 @@ from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.fitting.hypotheses import WIDEST_M, Hypothesis, HypothesisSteps
 from pop_core.fitting.initialisation import initial_parameters
 from pop_core.fitting.levenberg_marquardt import assemble, cost_of
+from pop_core.fitting.limb_exchange import Judge, exchange_limbs
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.priors import neighbour_sigma_rad
 from pop_core.retrieval.candidate import PoseCandidate
@@ -71,18 +72,24 @@ class BodyFitter:
         """Return the body that explains an observation best, started from retrieved poses.
 
         All candidates are fitted to the joints (step 5), the better ones to the surface (steps 6
-        and 7), the best of those to the end with the free space (step 8).
+        and 7), the best of those, with limbs of the others where they serve better, to the end
+        with the free space (step 8).
         """
-        hypotheses = [self._start(candidate, candidates) for candidate in candidates]
-        for hypothesis in hypotheses:
+        started = [self._start(candidate, candidates) for candidate in candidates]
+        for hypothesis in started:
             self.steps.fit_joints(hypothesis, observation)
-        hypotheses = _best(hypotheses, self.config.surface_hypotheses)
+        hypotheses = _best(started, self.config.surface_hypotheses)
         for hypothesis in hypotheses:
             self.steps.fit_surface(hypothesis, observation, EARLY_SCALES_M, free_space=False)
-        hypotheses = _best(self._judged(hypotheses, observation), self.config.final_hypotheses)
+        judge = self._judge(hypotheses, observation)
+        judge(hypotheses)
+        hypotheses = [
+            exchange_limbs(hypothesis, [h for h in started if h is not hypothesis], judge)
+            for hypothesis in _best(hypotheses, self.config.final_hypotheses)]
         for hypothesis in hypotheses:
             self.steps.fit_surface(hypothesis, observation, LATE_SCALES_M, free_space=True)
-        winner, *others = self._judged(hypotheses, observation)
+        self._judge(hypotheses, observation)(hypotheses)
+        winner, *others = _best(hypotheses, len(hypotheses))
         return self._finish(self._polished(winner, observation), others, observation)
 
     def _start(self, candidate: PoseCandidate, all_of_them: Sequence[PoseCandidate]) -> Hypothesis:
@@ -90,13 +97,10 @@ class BodyFitter:
         belief = PriorBelief(self.prior, parameters.body_pose, neighbour_sigma_rad(all_of_them))
         return Hypothesis(self.coarse.state(parameters), belief)
 
-    def _judged(
-        self, hypotheses: Sequence[Hypothesis], observation: Observation
-    ) -> list[Hypothesis]:
-        """Return hypotheses best first, by E_depth over the pixels most of them agree on."""
-        self.steps.score(
-            hypotheses, observation, self.steps.common_segment(hypotheses, observation))
-        return _best(hypotheses, len(hypotheses))
+    def _judge(self, hypotheses: Sequence[Hypothesis], observation: Observation) -> Judge:
+        """Return what sets costs by E_depth over the pixels that most hypotheses agree on."""
+        segment = self.steps.common_segment(hypotheses, observation)
+        return lambda judged: self.steps.score(judged, observation, segment)
 
     def _polished(self, winner: Hypothesis, observation: Observation) -> Hypothesis:
         """Take the last steps on the full mesh: the coarse one cuts the corners of limbs."""
