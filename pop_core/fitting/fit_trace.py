@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
 from pop_core.fitting.depth_consistency import depth_energy, see_body
-from pop_core.fitting.energy import BodyEnergy, PriorBelief, TermWeights
+from pop_core.fitting.energy import BodyEnergy, TermWeights
 from pop_core.fitting.hypotheses import Hypothesis, HypothesisSteps
 from pop_core.fitting.levenberg_marquardt import cost_of
 from pop_core.fitting.observation import Observation
@@ -42,8 +42,9 @@ class TracedSteps(HypothesisSteps):
         """Take over model and settings of other steps."""
         super().__init__(steps.model, steps.config, steps.segmentation)
         self._traces: list[list[TracedStep]] = []
-        # A hypothesis is copied on its way; what it believes stays the same object.
-        self._beliefs: list[PriorBelief] = []
+        # A hypothesis is copied on its way and gets limbs of others; the spread of its neighbours
+        # stays the same object.
+        self._spreads: list[Float[np.ndarray, '23']] = []
         self._stage = POLISH
 
     def take_traces(self) -> list[list[TracedStep]]:
@@ -55,9 +56,9 @@ class TracedSteps(HypothesisSteps):
         """Fit joints; the first hypothesis after a fit to a surface begins another person."""
         if self._stage != JOINTS:
             self._traces.append([])
-            self._beliefs = []
+            self._spreads = []
         self._stage = JOINTS
-        self._beliefs.append(hypothesis.belief)
+        self._spreads.append(hypothesis.belief.sigma_rad)
         super().fit_joints(hypothesis, observation)
 
     def fit_surface(
@@ -74,7 +75,8 @@ class TracedSteps(HypothesisSteps):
         active: Bool[np.ndarray, 'x'], pairs: Sequence[Pairs],
     ) -> None:
         super()._step(hypothesis, observation, weights, active, pairs)
-        number = next(i for i, each in enumerate(self._beliefs) if each is hypothesis.belief)
+        spread = hypothesis.belief.sigma_rad
+        number = next(i for i, each in enumerate(self._spreads) if each is spread)
         joints, depth = self._energies(hypothesis, observation)
         self._traces[-1].append(TracedStep(number, self._stage, joints, depth))
 
