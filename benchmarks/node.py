@@ -72,7 +72,8 @@ def run(arguments: list[str]) -> int:
     results = {}
     for name in options.parts or parts:
         if name == 'soak':
-            row, good = soak(options.people[0], options.minutes, console.print)
+            row, good = soak(options.people[0], options.minutes, lambda row: console.print(
+                ', '.join(f'{key} {value}' for key, value in row.items()), markup=False))
             results[name] = [row]
         else:
             results[name] = parts[name]()
