@@ -8,7 +8,7 @@ from pop_core.estimate import TrackState
 from pop_core.tracking.track import PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
 
-LATEST_S = 0.12  # slow cameras: people move far between frames
+LONG_GAP_S = 0.12  # between two frames: people move far, and there is time to look
 SOON = 2  # frames from one look to the next while somebody is not followed well
 
 
@@ -18,7 +18,7 @@ class DetectionSchedule:
     def __init__(self, config: TrackingConfig) -> None:
         """Ask at the first frame."""
         self._config = config
-        self._frames_since, self._last_ns = config.detect_every, 0
+        self._frames_since, self._now_ns = config.detect_every, 0
 
     def is_due(self, tracks: Sequence[PersonTrack], now_ns: int) -> bool:
         """Return whether to look for people in this frame; if so, it counts as done."""
@@ -26,10 +26,11 @@ class DetectionSchedule:
         every = self._config.detect_every
         if any(_needs_a_look(track) for track in tracks):
             every = min(every, SOON)
-        late = (now_ns - self._last_ns) * 1e-9 > LATEST_S
-        if tracks and not late and self._frames_since < every:
+        gap_s = (now_ns - self._now_ns) * 1e-9
+        self._now_ns = now_ns
+        if tracks and gap_s <= LONG_GAP_S and self._frames_since < every:
             return False
-        self._frames_since, self._last_ns = 0, now_ns
+        self._frames_since = 0
         return True
 
 

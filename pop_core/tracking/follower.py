@@ -12,6 +12,7 @@ from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.depth_consistency import Visibility, see_body
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.plausibility import plausibility
+from pop_core.fitting.uncertainty import joint_covariance
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.pipeline import BodyPipeline, PersonFit, Scene
 from pop_core.tracking.association import Expected
@@ -24,6 +25,7 @@ from pop_core.tracking.body_filter import (
     with_known_shape,
 )
 from pop_core.tracking.limbs import contradicted_joints, limb_bones, loosened
+from pop_core.tracking.motion import N_MOVING
 from pop_core.tracking.rivals import costs, follow_alternatives
 from pop_core.tracking.track import Alternative, PersonTrack
 from pop_core.tracking.track_view import observe_track
@@ -36,6 +38,10 @@ CONTRADICTED = 0.4  # a body is not where the camera saw through this share of i
 USUAL_SHARE = 0.05  # how fast the usual E_depth follows
 UNUSUAL, UNUSUAL_M = 1.5, 0.01  # E_depth above this many times the usual and this much more
 TRUSTED_SUPPORT = 0.5
+# Standard deviations are wider than the filter's own by this: frames err together, and a limb may
+# be taken for another (`python -m benchmarks tracking`, coverage rows).
+OVERSURE = 1.5
+HIDDEN_TURN_RAD = 0.5  # people hidden for a while come out much as they went in
 RESOLVED = 8.0  # cost that a body may be worse by for each joint that agrees with it instead
 
 
@@ -158,7 +164,7 @@ class Follower:
     ) -> BodyEstimate | None:
         """Update a track by a fit and return the person."""
         track.filter = updated(track.filter, fit)
-        hessian = inverse(track.filter.covariance) + fit.curvature.prior
+        hessian = (inverse(track.filter.covariance) + fit.curvature.prior) / OVERSURE**2
         body = fit.as_body_fit(
             hessian, tuple(other.filter.parameters for other in track.alternatives))
         if lifted is not None:
@@ -206,13 +212,18 @@ class Follower:
         config = self.pipeline.config.fitting
         hessian = inverse(track.filter.covariance) + prior_curvature(
             state, self.pipeline.fitter.prior, config.prior_weight)
+        turns = np.arange(3, N_MOVING)
+        hessian[turns, turns] += HIDDEN_TURN_RAD**-2.0
         body = BodyFit(
             state.parameters, hessian, visibility, state, visibility.rendered.covered, {}, ())
         estimate, _ = self.pipeline.estimate(scene, body, track.trust)
         track.joint_state = estimate.joint_state
+        # Depth that shows none of the person does not speak against the body.
+        covariance = joint_covariance(
+            self.pipeline.model, state.parameters, hessian, (), estimate.joint_state)
         return replace(
             estimate, mask=np.zeros_like(estimate.mask), track=track.tag(),
-            score=track.trust * float(np.exp(-track.unseen_s)))
+            joint_covariance=covariance, score=track.trust * float(np.exp(-track.unseen_s)))
 
     def _body(self, belief: FilterState) -> BodyState:
         return self.pipeline.fitter.coarse.state(belief.parameters)

@@ -24,17 +24,17 @@ from pop_core.segmentation.ground import Ground, find_ground
 from pop_core.stopwatch import Stopwatch
 from pop_core.tracking.association import Expected, associate, offset_m
 from pop_core.tracking.body_filter import first_state
-from pop_core.tracking.detection_schedule import DetectionSchedule
+from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule
 from pop_core.tracking.finder import Finder, Found
 from pop_core.tracking.follower import Follower
 from pop_core.tracking.track import PersonTrack, new_track
 from pop_core.tracking.tracking_config import TrackingConfig
 
 STALE_S = 0.25  # unseen for longer, a person is looked for anew
-LONG_GAP_S = 0.12  # between frames: limbs go anywhere, and there is time
 MOST_DOUBTS, RESTART_EVERY_S = 2, 1.0
 MOST_MISSES = 3
 CLEARLY_SEEN = 8  # shared joints that a body claims the camera sees: a detector would find it
+SETTLED_S = 0.5  # after a body was found
 ASTRAY_M = 0.3  # doubt of the place of somebody whom keypoints contradict
 
 
@@ -144,9 +144,13 @@ class BodyTracker:
         return bodies, statuses
 
     def _expected(self, track: PersonTrack) -> Expected:
-        """Return where a person should be; whom keypoints contradict may be elsewhere."""
+        """Return where a person should be; who was just found or is contradicted may be elsewhere.
+
+        Of somebody who comes out from behind a wall the first look sees an arm.
+        """
         expected = self._follower.expected(track)
-        if track.doubts == 0 and track.misses == 0:
+        settled = (track.now_ns - track.restarted_ns) * 1e-9 > SETTLED_S
+        if settled and track.doubts == 0 and track.misses == 0:
             return expected
         return replace(expected, doubt_m=max(expected.doubt_m, ASTRAY_M))
 
