@@ -115,6 +115,8 @@ def _refine(
 ) -> Ground:
     """Return the least squares plane of the points on a plane, far ones counting less."""
     weight = (np.abs(ground.height(points)) < width) / width**2
+    if np.count_nonzero(weight) < 3:
+        return ground  # one noisy normal proposed it, and nothing agrees
     centre = weight @ points / weight.sum()
     spread = np.sqrt(weight)[:, None] * (points - centre)
     normal = np.linalg.eigh(spread.T @ spread)[1][:, 0]

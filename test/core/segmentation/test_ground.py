@@ -71,3 +71,12 @@ def test_floor_pixels_are_those_of_the_floor() -> None:
     assert not marked[high].any()
     raised = np.where(depth < 5.0, depth * 0.9, depth).astype(np.float32)
     assert not truth.floor_pixels(raised, rays)[depth < 5.0].any()
+
+
+@pytest.mark.filterwarnings('error')
+def test_pure_noise_has_no_floor_and_breaks_nothing() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(5):
+        depth = rng.uniform(0.5, 6.0, (240, 320)).astype(np.float32)
+        found = find_ground(frame(depth))
+        assert found is None or np.isfinite(found.normal).all()
