@@ -42,9 +42,10 @@ def change(player: Player, transition: str) -> bool:
 def fit_one(player: Player, recording: Recording) -> None:
     """Play the frame until its person comes back."""
     assert player.spin_until(player.is_heard)
-    player.received['joints'].clear()
+    for messages in player.received.values():
+        messages.clear()
     player.play(recording.scenes[0].frame)
-    assert player.spin_until(lambda: player.received['joints'])
+    assert player.spin_until(lambda: all(player.received.values()))
 
 
 def test_a_manager_takes_the_node_through_its_life(recording: Recording) -> None:

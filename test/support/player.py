@@ -47,13 +47,13 @@ class Listener:
         self.node.destroy_node()
         rclpy.shutdown(context=self._context)
 
-    def spin_until(self, done: Callable[[], object], timeout_s: float = 20.0) -> bool:
+    def spin_until(self, done: Callable[[], object], timeout_s: float = 60.0) -> bool:
         end_s = time.monotonic() + timeout_s
         while not done() and time.monotonic() < end_s:
             self._executor.spin_once(timeout_sec=0.05)
         return bool(done())
 
-    def call(self, kind: type, service: str, request: object, timeout_s: float = 20.0) -> Any:
+    def call(self, kind: type, service: str, request: object, timeout_s: float = 60.0) -> Any:
         """Return the answer of a service of /pop."""
         client = self.node.create_client(kind, f'/pop/{service}')
         assert client.wait_for_service(10)
