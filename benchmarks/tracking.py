@@ -58,9 +58,10 @@ def run(argv: list[str]) -> int:
     console.print(kind_table(kinds))
     for name, summary in summaries.items():
         alone = summary['alone_m']
-        console.print(
-            f'{name}: also gives out bodies that another method does not, or of people hardly '
-            f'seen: {alone["n"] // 14}, joints {1000 * alone["mean"]:.0f} mm off')
+        if alone['n']:
+            console.print(
+                f'{name}: also gives out bodies that another method does not, or of people '
+                f'hardly seen: {alone["n"] // 14}, joints {1000 * alone["mean"]:.0f} mm off')
     if options.json is not None:
         report = {'options': vars(options) | {'json': str(options.json)}, 'methods': summaries,
                   'kinds': kinds}
