@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,21 @@ from pop_ros.frame_folder import load_frame
 @pytest.fixture(scope='module')
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     return record(tmp_path_factory.mktemp('keypoints'), n_frames=1, rate_hz=1.0)
+
+
+@pytest.fixture
+def start() -> Iterator[Callable[..., RunningNode]]:
+    """Start nodes, none of which outlives a test that fails."""
+    nodes: list[RunningNode] = []
+
+    def begin(*arguments: str) -> RunningNode:
+        nodes.append(RunningNode(*arguments))
+        return nodes[-1]
+
+    yield begin
+    for node in nodes:
+        if node.process.poll() is None:
+            node.process.kill()
 
 
 def flags(recording: Recording) -> list[str]:
@@ -48,8 +64,10 @@ def fit_one(player: Player, recording: Recording) -> None:
     assert player.spin_until(lambda: all(player.received.values()))
 
 
-def test_a_manager_takes_the_node_through_its_life(recording: Recording) -> None:
-    running = RunningNode(*flags(recording), '--ros-args', '-p', 'autostart:=false')
+def test_a_manager_takes_the_node_through_its_life(
+    recording: Recording, start: Callable[..., RunningNode]
+) -> None:
+    running = start(*flags(recording), '--ros-args', '-p', 'autostart:=false')
     with Player(joints=PoseArray, mesh=Marker) as player:
         assert state(player) == 'unconfigured'
         assert not change(player, 'activate')
@@ -83,9 +101,9 @@ def test_a_manager_takes_the_node_through_its_life(recording: Recording) -> None
 
 
 def test_without_subscribers_the_camera_is_left_alone_and_qos_is_the_user_s(
-    recording: Recording
+    recording: Recording, start: Callable[..., RunningNode]
 ) -> None:
-    running = RunningNode(
+    running = start(
         *flags(recording), '--ros-args', '-p',
         'qos_overrides./pop/joints.publisher.reliability:=best_effort')
     with Player() as player:
@@ -104,8 +122,10 @@ def test_without_subscribers_the_camera_is_left_alone_and_qos_is_the_user_s(
     assert running.end() == 0
 
 
-def test_configuring_without_keypoints_fails_with_a_sentence_and_the_node_stays() -> None:
-    running = RunningNode('--keypoints', 'json', '--keypoints-dir', '/nowhere',
+def test_configuring_without_keypoints_fails_with_a_sentence_and_the_node_stays(
+    start: Callable[..., RunningNode]
+) -> None:
+    running = start('--keypoints', 'json', '--keypoints-dir', '/nowhere',
                           '--ros-args', '-p', 'autostart:=false')
     with Player() as player:
         assert not change(player, 'configure')
@@ -114,9 +134,11 @@ def test_configuring_without_keypoints_fails_with_a_sentence_and_the_node_stays(
     assert running.end() == 0
 
 
-def test_services_act_on_what_is_shown_and_seen(recording: Recording, tmp_path: Path) -> None:
+def test_services_act_on_what_is_shown_and_seen(
+    recording: Recording, tmp_path: Path, start: Callable[..., RunningNode]
+) -> None:
     shots = tmp_path / 'shots'
-    running = RunningNode(
+    running = start(
         *flags(recording), '--ros-args', '-p', f'snapshot.folder:={shots}')
     with Player(joints=PoseArray, mesh=Marker) as player:
         early = player.call(Trigger, 'snapshot', Trigger.Request())
@@ -173,10 +195,11 @@ def test_a_signal_while_modules_are_imported_ends_the_node_cleanly(
 
 
 def test_a_start_with_cold_caches_says_what_takes_so_long_and_can_be_ended(
-    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    start: Callable[..., RunningNode],
 ) -> None:
     monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path))
-    running = RunningNode(*flags(recording))
+    running = start(*flags(recording))
     running.wait_for('compiling kernels of')
     assert 'about a minute, once' in running.output
     assert running.end() == 0, running.output
