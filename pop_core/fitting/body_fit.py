@@ -72,8 +72,8 @@ class BodyFitter:
         """Return the body that explains an observation best, started from retrieved poses.
 
         All candidates are fitted to the joints (step 5), the better ones to the surface (steps 6
-        and 7), the best of those to the end with the free space (step 8). The first of them takes
-        limbs of any other where those serve better.
+        and 7), the best of those, with limbs of the others where they serve better, to the end
+        with the free space (step 8).
         """
         started = [self._start(candidate, candidates) for candidate in candidates]
         for hypothesis in started:
@@ -83,8 +83,9 @@ class BodyFitter:
             self.steps.fit_surface(hypothesis, observation, EARLY_SCALES_M, free_space=False)
         judge = self._judge(hypotheses, observation)
         judge(hypotheses)
-        best, *rivals = _best(hypotheses, self.config.final_hypotheses)
-        hypotheses = [exchange_limbs(best, [h for h in started if h is not best], judge), *rivals]
+        hypotheses = [
+            exchange_limbs(hypothesis, [h for h in started if h is not hypothesis], judge)
+            for hypothesis in _best(hypotheses, self.config.final_hypotheses)]
         for hypothesis in hypotheses:
             self.steps.fit_surface(hypothesis, observation, LATE_SCALES_M, free_space=True)
         self._judge(hypotheses, observation)(hypotheses)
