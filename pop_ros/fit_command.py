@@ -28,8 +28,9 @@ def fit(
     out: Annotated[Path, typer.Option('--out', help='Folder for the results.')],
     keypoints: Annotated[list[str] | None, typer.Option(
         '--keypoints', metavar='SOURCE',
-        help='json (keypoints.json of each frame), the path of an ONNX network, or a name of '
-             '"pop models list"; several are merged. Without it, keypoints.json.')] = None,
+        help='json (keypoints.json of each frame), depth (the embedded network, coarse), the path '
+             'of an ONNX network, or a name of "pop models list"; several are merged. Without it, '
+             'keypoints.json where there is one, depth elsewhere.')] = None,
     decoder: Annotated[str | None, typer.Option(
         '--decoder', metavar='NAME',
         help='How to read a network whose outputs do not tell.')] = None,

@@ -85,9 +85,9 @@ def parse_arguments(arguments: Sequence[str]) -> NodeArguments:
         description='Fit people to RGB-D images: mesh, joints and points of every person.')
     parser.add_argument(
         '--keypoints', action='append', metavar='SOURCE',
-        help='json (OpenPose files), the path of an ONNX network, or a name of "pop models list"; '
-             'several, given again or with commas between, are merged; depth, the embedded '
-             'network, is not in this version')
+        help='depth (the embedded network, coarse; the default), json (OpenPose files), the path '
+             'of an ONNX network, or a name of "pop models list"; several, given again or with '
+             'commas between, are merged')
     parser.add_argument(
         '--keypoints-dir', type=Path, metavar='DIR',
         help='folder of OpenPose files named <stamp_ns>.json, for --keypoints json')

@@ -34,8 +34,8 @@ def replay(
     )] = False,
     keypoints: Annotated[list[str], typer.Option(
         '--keypoints', metavar='SOURCE',
-        help='json (OpenPose files), the path of an ONNX network, or a name of "pop models '
-             'list"; several are merged. depth, the embedded network, is not in this version.',
+        help='depth (the embedded network, coarse), json (OpenPose files), the path of an ONNX '
+             'network, or a name of "pop models list"; several are merged.',
     )] = ['depth'],  # noqa: B006 - typer reads it, nobody writes it
     keypoints_dir: Annotated[Path | None, typer.Option(
         '--keypoints-dir', help='Folder of <stamp_ns>.json files.')] = None,

@@ -40,7 +40,7 @@ class DepthNetConfig:
         0.03, unit='m^2', minimum=0.0, maximum=1.0,
         about='Smallest visible surface, as seen from the camera, that makes a person.')
     min_person_score: float = setting(
-        0.25, minimum=0.0, maximum=1.0,
+        0.32, minimum=0.0, maximum=1.0,
         about='Smallest score of a person: that of the surface seen and of the surest joints.')
     trunk_gap_m: float = setting(
         0.30, unit='m', minimum=0.05, maximum=1.0,

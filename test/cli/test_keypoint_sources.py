@@ -8,6 +8,7 @@ from cli.conftest import write_frame
 from support.onnx_files import save_network
 
 from pop_core.errors import NetworkShapeError
+from pop_core.keypoints.depth_net import load_depth_net
 from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.keypoints.fusion import FusedDetector
 from pop_core.keypoints.onnx_detector import OnnxKeypointDetector
@@ -137,3 +138,13 @@ def test_a_frame_without_a_file_is_told(scene, networks, tmp_path):
         source.choose(folder)
         with pytest.raises(SourceError, match=r'expected keypoints\.json'):
             source.detect(frame)
+
+
+def test_a_frame_without_a_file_is_left_to_the_embedded_network(scene, tmp_path):
+    frame, _ = scene
+    folder = FrameFolder(write_frame(tmp_path / 'one', frame, None), Path('one'))
+    source = FrameKeypoints(None, None)
+    source.choose(folder)
+    found, expected = source.detect(frame), load_depth_net().detect(frame)
+    assert len(found) == len(expected) > 0
+    np.testing.assert_array_equal(found[0].keypoints_px, expected[0].keypoints_px)
