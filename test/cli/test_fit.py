@@ -107,7 +107,8 @@ def test_bad_inputs_get_one_line_each_and_the_good_one_is_done(tmp_path, scene):
     (json_cut / 'keypoints.json').write_text('{"people": [')
     unsourced = write_frame(tmp_path / 'unsourced', scene[0], None)
     result = fit(
-        tmp_path / 'missing', cut, json_cut, unsourced, good, '--out', tmp_path / 'out')
+        tmp_path / 'missing', cut, json_cut, unsourced, good, '--out', tmp_path / 'out',
+        '--keypoints', 'json')
     assert result.exit_code == 2
     lines = result.stderr.strip().splitlines()
     assert len(lines) == 4
