@@ -7,6 +7,9 @@ from typing import Annotated
 
 import typer
 
+# Frames in a folder are rarely all that a camera took; so far apart, each is looked at anew.
+FRAME_RATE_HZ = 5.0
+
 app = typer.Typer(no_args_is_help=True, help='Make bags.')
 
 
@@ -22,7 +25,9 @@ def make(
     *,
     out: Annotated[Path, typer.Option('--out', help='New rosbag2 folder.')],
     rate: Annotated[float, typer.Option(
-        '--rate', min=0.001, max=1000.0, help='Frames per second of the bag.')] = 10.0,
+        '--rate', min=0.001, max=1000.0,
+        help='Frames per second, as they were taken: people are followed from frame to frame. '
+             'Scenes that have nothing to do with each other: 0.2.')] = FRAME_RATE_HZ,
     frame_id: Annotated[str, typer.Option(
         '--frame-id', help='Frame of the colour camera.')] = 'camera_color_optical_frame',
     keypoints_dir: Annotated[Path | None, typer.Option(

@@ -38,7 +38,7 @@ def make_bag(
     folder: Path,
     out: Path,
     *,
-    rate_hz: float = 10.0,
+    rate_hz: float,
     frame_id: str = CAMERA_FRAME,
     keypoints_dir: Path | None = None,
     on_frame: Callable[[int, int], None] = lambda _done, _total: None,
