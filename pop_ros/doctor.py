@@ -156,15 +156,16 @@ def kernels() -> Finding:
 
 
 def networks() -> Finding:
-    """Return which networks for keypoints have been fetched."""
+    """Return which networks for keypoints have been fetched beside the embedded one."""
     from pop_ros.network_registry import load_registry, networks_folder
 
     found = [entry.name for entry in load_registry() if entry.path.is_file()]
     if found:
         return Finding('keypoint networks', Verdict.GOOD, ', '.join(found),
                        f'pop node --keypoints {found[0]}')
-    return Finding('keypoint networks', Verdict.NOTE, f'none in {networks_folder()}',
-                   'pop models list names some; a file of yours does as well, and OpenPose files')
+    return Finding('keypoint networks', Verdict.NOTE,
+                   f'none in {networks_folder()}; the embedded one (depth) finds people coarsely',
+                   'pop models list names better ones; a file of yours or OpenPose files do as well')
 
 
 def middleware(node: Node, context: Context) -> Finding:
