@@ -165,7 +165,7 @@ def networks() -> Finding:
                        f'pop node --keypoints {found[0]}')
     return Finding('keypoint networks', Verdict.NOTE,
                    f'none in {networks_folder()}; the embedded one (depth) finds people coarsely',
-                   'pop models list names better ones; a file of yours or OpenPose files do as well')
+                   'pop models list names better ones; files of yours and of OpenPose do as well')
 
 
 def middleware(node: Node, context: Context) -> Finding:
