@@ -23,7 +23,8 @@ from pop_ros.pop_messages import pop_msgs
 from pop_ros.qos import describe_qos
 from pop_ros.tf_messages import tf2_msgs
 
-DISCOVERY_S = 1.5
+DISCOVERY_S = 5.0  # at most; busy machines are slow to hear of each other
+SETTLED_S = 1.5  # no further topic for so long: all are known
 ECHO_S = 5.0
 SHARED_MEMORY = Path('/dev/shm')
 ENOUGH_SHARED_MEMORY = 100 * 2**20
@@ -200,9 +201,7 @@ def middleware(node: Node, context: Context) -> Finding:
 
 def cameras(node: Node) -> Iterator[Finding]:
     """Yield the image topics that are published, and the presets that fit them."""
-    time.sleep(DISCOVERY_S)
-    seen = {topic for topic, kinds in node.get_topic_names_and_types()
-            if IMAGE_TYPES.intersection(kinds) and node.count_publishers(topic)}
+    seen = _image_topics(node)
     for topic in sorted(seen):
         offers = {describe_qos(o.qos_profile) for o in node.get_publishers_info_by_topic(topic)}
         yield Finding('image topic', Verdict.GOOD, f'{topic} ({", ".join(sorted(offers))})')
@@ -213,3 +212,18 @@ def cameras(node: Node) -> Iterator[Finding]:
         if preset.topics.color in seen and preset.topics.depth in seen:
             yield Finding('camera', Verdict.GOOD, f'{name} ({preset.driver})',
                           f'pop node --camera {name}')
+
+
+def _image_topics(node: Node) -> set[str]:
+    """Return the image topics that are published, once no further one is heard of."""
+    seen: set[str] = set()
+    started_s = changed_s = time.monotonic()
+    while time.monotonic() - started_s < DISCOVERY_S:
+        known = {topic for topic, kinds in node.get_topic_names_and_types()
+                 if IMAGE_TYPES.intersection(kinds) and node.count_publishers(topic)}
+        if known != seen:
+            seen, changed_s = known, time.monotonic()
+        if seen and time.monotonic() - changed_s > SETTLED_S:
+            break
+        time.sleep(0.1)
+    return seen
