@@ -151,8 +151,9 @@ def test_every_step_lets_one_frame_pass_while_the_clock_stands(
     press_enter(process, listener)
     listener.wait_for(lambda: listener.depths == 1 and listener.clock_stands(), process)
     assert listener.stamps == recording.stamps[:1]
-    last_ns = recording.stamps[1]
-    assert abs(listener.clock[-1] - last_ns) < STEP_NS / 2  # it stands before the next image
+    first_ns, last_ns = recording.stamps
+    # It stands before the next image; the depth beside that one may come first.
+    assert first_ns <= listener.clock[-1] < last_ns + STEP_NS / 2
     assert process.stdin is not None
     process.stdin.close()  # Ctrl-D: everything else passes
     process.stdin = None  # or communicate() would close it again
