@@ -14,6 +14,14 @@ CAMERA = Camera(320, 240, 262.0, 262.0, 159.5, 119.5)
 WALL_M = 4.0
 
 
+def facing_person(betas: np.ndarray) -> BodyParameters:
+    """A person facing the camera with lowered, slightly bent arms."""
+    pose = np.zeros((23, 3))
+    pose[15, 2], pose[16, 2] = -1.1, 1.1
+    pose[17, 1], pose[18, 1] = -0.5, 0.5
+    return BodyParameters(np.array([0.1, 0.1, 2.5]), np.array([np.pi, 0, 0]), pose, betas)
+
+
 def photograph(body: BodyModel, person: BodyParameters) -> RgbdFrame:
     """The person before a wall, without noise."""
     depth = render_depth(vertices(body, person), body.f, CAMERA).depth_m

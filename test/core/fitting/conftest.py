@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from support.one_person import facing_person
 
 from pop_core.body.default_body import default_body
 from pop_core.body.model import BodyModel, BodyParameters
@@ -12,10 +13,6 @@ def body() -> BodyModel:
 
 @pytest.fixture(scope='session')
 def person() -> BodyParameters:
-    """A person facing the camera with lowered, slightly bent arms."""
-    pose = np.zeros((23, 3))
-    pose[15, 2], pose[16, 2] = -1.1, 1.1
-    pose[17, 1], pose[18, 1] = -0.5, 0.5
     betas = np.zeros(10)
     betas[:2] = [0.5, -0.5]
-    return BodyParameters(np.array([0.1, 0.1, 2.5]), np.array([np.pi, 0, 0]), pose, betas)
+    return facing_person(betas)
