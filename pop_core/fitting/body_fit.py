@@ -115,14 +115,15 @@ class BodyFitter:
         """Return the winner with its energies and the curvature of its cost."""
         coarse = self.coarse.state(winner.state.parameters)
         visibility = see_body(coarse, observation)
-        segment = self.steps.segment(visibility, observation)
+        segment = self.steps.segment(visibility.rendered, observation)
         pairs = self.steps.surface_pairs(
             coarse, observation, visibility, segment, LATE_SCALES_M[-1])
         energy = BodyEnergy(coarse, observation, winner.belief, self.steps.weights(), pairs)
         blocks = energy.residuals(coarse, True)
         energies = {
             'E_J3D': cost_of(blocks[:1]), 'E_prior': cost_of(blocks[2:6]),
-            'E_NN': cost_of(blocks[6:]), 'E_depth': depth_energy(visibility, observation, segment),
+            'E_NN': cost_of(blocks[6:]),
+            'E_depth': depth_energy(visibility.rendered, observation, segment),
         }
         return BodyFit(
             coarse.parameters, assemble(blocks, self.coarse.size).hessian, visibility, coarse,

@@ -57,9 +57,14 @@ class Visibility:
         return self.sight != Sight.SELF_OCCLUDED
 
 
+def render_body(state: BodyState, observation: Observation) -> RenderedDepth:
+    """Return a body as the camera of an observation would see it alone."""
+    return render_depth(state.vertices, state.body.faces, observation.camera)
+
+
 def see_body(state: BodyState, observation: Observation) -> Visibility:
     """Return the visibility of a body's vertices in an observation."""
-    rendered = render_depth(state.vertices, state.body.faces, observation.camera)
+    rendered = render_body(state, observation)
     measured, uv = observation.depth_at(state.vertices)
     z = state.vertices[:, 2]
     inside = np.isfinite(measured) | np.isnan(measured)
@@ -148,7 +153,7 @@ def free_space_pairs(
 
 
 def depth_energy(
-    visibility: Visibility,
+    rendered: RenderedDepth,
     observation: Observation,
     segment: Bool[np.ndarray, 'h w'],
     limit_m: float = 0.15,
@@ -160,12 +165,12 @@ def depth_energy(
     measured depth costs its gap; a body behind the scene costs nothing.
 
     Args:
-        visibility: The body's rendering.
+        rendered: D_body.
         observation: D_in.
         segment: The person's pixels, the same for every hypothesis that is compared.
         limit_m: Truncation of a pixel's cost [m].
     """
-    body, measured = visibility.rendered.depth_m, observation.depth_m
+    body, measured = rendered.depth_m, observation.depth_m
     rest = np.where(segment, np.float32(np.inf), measured)
     with np.errstate(invalid='ignore'):
         # NaN (no measurement) can hide anything, so it costs nothing.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pop_core.fitting.depth_consistency import depth_energy, see_body
+from pop_core.fitting.depth_consistency import depth_energy, render_body
 from pop_core.fitting.energy import BodyEnergy, TermWeights
 from pop_core.fitting.hypotheses import Hypothesis, HypothesisSteps
 from pop_core.fitting.levenberg_marquardt import cost_of
@@ -86,6 +86,6 @@ class TracedSteps(HypothesisSteps):
         state = hypothesis.state
         energy = BodyEnergy(state, observation, hypothesis.belief, self.weights(), None)
         joints = cost_of(energy.residuals(state, False)[:1])
-        visibility = see_body(state, observation)
-        segment = self.segment(visibility, observation)
-        return joints, depth_energy(visibility, observation, segment)
+        rendered = render_body(state, observation)
+        segment = self.segment(rendered, observation)
+        return joints, depth_energy(rendered, observation, segment)

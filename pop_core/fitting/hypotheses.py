@@ -24,6 +24,7 @@ from pop_core.fitting.depth_consistency import (
     Visibility,
     depth_energy,
     free_space_pairs,
+    render_body,
     see_body,
 )
 from pop_core.fitting.energy import BodyEnergy, PriorBelief, TermWeights
@@ -33,6 +34,7 @@ from pop_core.fitting.levenberg_marquardt import FIRST_DAMPING, cost_of, levenbe
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import Pairs, join_pairs
 from pop_core.fitting.robust_loss import geman_mcclure_share
+from pop_core.rendering.depth_renderer import RenderedDepth
 from pop_core.segmentation.body_segmentation import SegmentationConfig, segment_body
 
 WIDEST_M = 0.15  # first scale of the robust surface kernel
@@ -91,7 +93,7 @@ class HypothesisSteps:
         for k, scale_m in enumerate(scales_m):
             visibility = see_body(hypothesis.state, observation)
             if segment is None or k % 2 == 0:
-                segment = self.segment(visibility, observation)
+                segment = self.segment(visibility.rendered, observation)
             pairs = [self.surface_pairs(
                 hypothesis.state, observation, visibility, segment, scale_m)]
             if free_space and self.config.free_space:
@@ -116,8 +118,8 @@ class HypothesisSteps:
             energy = BodyEnergy(
                 hypothesis.state, observation, hypothesis.belief, self.weights(), floor,
                 kernel=geman_mcclure_share)
-            visibility = see_body(hypothesis.state, observation)
-            depth = depth_energy(visibility, observation, segment)
+            rendered = render_body(hypothesis.state, observation)
+            depth = depth_energy(rendered, observation, segment)
             hypothesis.cost = DEPTH_SCORE * depth + cost_of(
                 energy.residuals(hypothesis.state, False))
 
@@ -125,17 +127,17 @@ class HypothesisSteps:
         self, hypotheses: Sequence[Hypothesis], observation: Observation
     ) -> Bool[np.ndarray, 'h w']:
         """Return the pixels that at least half of the hypotheses call the person."""
-        votes = [self.segment(see_body(h.state, observation), observation) for h in hypotheses]
+        votes = [self.segment(render_body(h.state, observation), observation) for h in hypotheses]
         return np.asarray(np.mean(votes, axis=0) >= 0.5)
 
     def segment(
-        self, visibility: Visibility, observation: Observation
+        self, rendered: RenderedDepth, observation: Observation
     ) -> Bool[np.ndarray, 'h w']:
         """Return the pixels of a hypothesis (step 6) in the thinned window."""
         # Pixels of a thinned window are further apart, and so is the depth between them.
         gamma = self.segmentation.gamma_m * observation.window.stride
         return segment_body(
-            observation.depth_m, visibility.rendered, observation.own, observation.camera.fx,
+            observation.depth_m, rendered, observation.own, observation.camera.fx,
             replace(self.segmentation, gamma_m=min(gamma, 0.2)))
 
     def surface_pairs(

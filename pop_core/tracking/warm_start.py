@@ -128,7 +128,7 @@ class WarmStart:
         damping = FIRST_DAMPING
         active = np.ones(state.body.size, dtype=bool)
         visibility = see_body(state, observation)
-        segment = self.fitter.steps.segment(visibility, observation)
+        segment = self.fitter.steps.segment(visibility.rendered, observation)
         places = HidingPlaces(observation, segment, state.vertices[:, 2])
         for k, scale_m in enumerate(scales_m):
             pairs = self._pairs(state, observation, visibility, segment, places, float(scale_m))
@@ -140,12 +140,12 @@ class WarmStart:
                 state, energy.residuals, BodyState.moved, active, damping)
             state, damping = report.state, report.damping
             visibility = see_body(state, observation)
-            segment = self.fitter.steps.segment(visibility, observation)
+            segment = self.fitter.steps.segment(visibility.rendered, observation)
         curvature, blocks = energy.curvature(state)
         energies = {
             'E_J3D': cost_of(blocks[:1]), 'E_prior': cost_of(blocks[2:6]),
             'E_NN': cost_of(blocks[6:]),
-            'E_depth': depth_energy(visibility, observation, segment),
+            'E_depth': depth_energy(visibility.rendered, observation, segment),
         }
         return WarmFit(state, visibility, segment, curvature, energies)
 
