@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
 from pop_core.body.joints import N_JOINTS, PARENTS
-from pop_core.depth_noise import USUAL_NOISE, DepthNoise
+from pop_core.depth_noise import DepthNoise
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.depth_consistency import Sight, Visibility
 from pop_core.fitting.observation import Observation
@@ -51,7 +51,7 @@ def match_points(
     points: Float[np.ndarray, 'n 3'],
     parts: Int[np.ndarray, 'n'],
     scale_m: float,
-    noise: DepthNoise = USUAL_NOISE,
+    noise: DepthNoise,
 ) -> Pairs:
     """Pair every measured point with its nearest vertex that faces the camera (pi_NN of E_NN).
 
@@ -75,7 +75,7 @@ def match_points(
 
 
 def match_vertices(
-    state: BodyState, visibility: Visibility, scale_m: float, noise: DepthNoise = USUAL_NOISE
+    state: BodyState, visibility: Visibility, scale_m: float, noise: DepthNoise
 ) -> Pairs:
     """Pair every visible vertex with the point measured at its pixel."""
     vertex = np.flatnonzero(visibility.sight == Sight.VISIBLE)

@@ -157,8 +157,9 @@ class WarmStart:
         # Planes only: a point tied to its nearest vertex holds a body that slides where it is,
         # and the filter would take that for knowledge.
         parts = [
-            match_points(state, visibility, points, labels, scale_m),
-            match_vertices(state, visibility, scale_m)]
+            match_points(
+                state, visibility, points, labels, scale_m, observation.noise),
+            match_vertices(state, visibility, scale_m, observation.noise)]
         if self.fitter.config.free_space:
             parts.append(free_space_pairs(state, visibility, places))
         if observation.ground is not None:

@@ -114,5 +114,5 @@ def test_points_recognised_as_a_far_part_do_not_pull(
     chest = state.vertices[state.body.main_bone == JOINT_INDEX['spine3']][:20]
     for part, pulls in (('spine2', True), ('left_hand', False)):
         parts = np.full(len(chest), JOINT_INDEX[part])
-        pairs = match_points(state, visibility, chest, parts, 0.1)
+        pairs = match_points(state, visibility, chest, parts, 0.1, observation.noise)
         assert (pairs.weight > 0).any() == pulls
