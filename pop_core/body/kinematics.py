@@ -53,8 +53,17 @@ def attached_positions(
     points: AttachedPoints, model: BodyModel, parameters: BodyParameters
 ) -> Float[np.ndarray, 'n 3']:
     """Return points carried by joints [m] in the parameters' outer frame."""
-    skeleton = pose_skeleton(model, parameters)
-    return parameters.scale * _posed(points, skeleton, parameters.betas) + parameters.transl
+    places = attached_places(points, pose_skeleton(model, parameters), parameters.betas)
+    return parameters.scale * places + parameters.transl
+
+
+def attached_places(
+    points: AttachedPoints, skeleton: PosedSkeleton, betas: Float[np.ndarray, 'b']
+) -> Float[np.ndarray, 'n 3']:
+    """Return points carried by joints of a posed tree [m], before scale and translation."""
+    rest = points.template + points.shapedirs @ betas
+    arm = rest - skeleton.rest_joints[points.joint]
+    return skeleton.p[points.joint] + np.einsum('nrc,nc->nr', skeleton.G[points.joint], arm)
 
 
 def attached_jacobian(
@@ -62,10 +71,11 @@ def attached_jacobian(
 ) -> Float[np.ndarray, 'n 3 x']:
     """Return d(position)/d(transl, rotation increments, betas, log scale) of attached points."""
     _, e = kernels.joint_shape_derivatives(skeleton.G, model.joint_shapedirs, model.parents)
+    places = attached_places(points, skeleton, parameters.betas)
     out = np.empty((len(points.joint), 3, 3 + 72 + model.n_betas + 1))
     kernels.attached_jacobian(
-        points.joint, _posed(points, skeleton, parameters.betas), points.shapedirs, skeleton.G,
-        skeleton.p, e, model.parents, parameters.scale, out,
+        points.joint, places, points.shapedirs, skeleton.G, skeleton.p, e, model.parents,
+        parameters.scale, out,
     )
     return out
 
@@ -90,11 +100,3 @@ def increment(
         betas=parameters.betas + step[75:-1],
         scale=float(parameters.scale * np.exp(step[-1])),
     )
-
-
-def _posed(
-    points: AttachedPoints, skeleton: PosedSkeleton, betas: Float[np.ndarray, 'b']
-) -> Float[np.ndarray, 'n 3']:
-    rest = points.template + points.shapedirs @ betas
-    arm = rest - skeleton.rest_joints[points.joint]
-    return skeleton.p[points.joint] + np.einsum('nrc,nc->nr', skeleton.G[points.joint], arm)

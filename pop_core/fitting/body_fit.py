@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.fitting.body_state import BodyState, FitBody
 from pop_core.fitting.depth_consistency import Visibility, depth_energy, see_body
-from pop_core.fitting.energy import BodyEnergy, PriorBelief
+from pop_core.fitting.energy import PAIR_BLOCKS, PRIOR_BLOCKS, BodyEnergy, PriorBelief
 from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.fitting.hypotheses import WIDEST_M, Hypothesis, HypothesisSteps
 from pop_core.fitting.initialisation import initial_parameters
@@ -121,8 +121,8 @@ class BodyFitter:
         energy = BodyEnergy(coarse, observation, winner.belief, self.steps.weights(), pairs)
         blocks = energy.residuals(coarse, True)
         energies = {
-            'E_J3D': cost_of(blocks[:1]), 'E_prior': cost_of(blocks[2:6]),
-            'E_NN': cost_of(blocks[6:]),
+            'E_J3D': cost_of(blocks[:1]), 'E_prior': cost_of(blocks[PRIOR_BLOCKS]),
+            'E_NN': cost_of(blocks[PAIR_BLOCKS]),
             'E_depth': depth_energy(visibility.rendered, observation, segment),
         }
         return BodyFit(

@@ -7,11 +7,12 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Int
 
+from pop_core.body.capsules import BodyCapsules, body_capsules
 from pop_core.body.joints import JOINT_INDEX
 from pop_core.body.kinematics import (
     PosedSkeleton,
     attached_jacobian,
-    attached_positions,
+    attached_places,
     increment,
     pose_skeleton,
 )
@@ -41,6 +42,7 @@ class FitBody:
         self.skinning = SkinningSubset(model, None if full else model.fit_vertices)
         self.faces: Int[np.ndarray, 'm 3'] = model.f if full else model.fit_faces
         self.landmarks: AttachedPoints = shared_points(model)
+        self.capsules: BodyCapsules = body_capsules(model)
         self.size = 3 + 72 + model.n_betas + 1
         self.main_bone: Int[np.ndarray, 'n'] = self.skinning.bone_ids[:, 0]
         self.cloth_m = np.where(np.isin(self.main_bone, BARE), 0.0, CLOTH_M)
@@ -89,7 +91,9 @@ class BodyState:
     @cached_property
     def landmarks(self) -> Float[np.ndarray, 's 3']:
         """Return the 15 shared points [m], camera frame."""
-        return attached_positions(self.body.landmarks, self.body.model, self.parameters)
+        parameters = self.parameters
+        places = attached_places(self.body.landmarks, self.skeleton, parameters.betas)
+        return parameters.scale * places + parameters.transl
 
     def landmark_jacobian(self) -> Float[np.ndarray, 's 3 x']:
         """Return the derivative of the shared points."""

@@ -26,8 +26,13 @@ from pop_core.fitting.residuals import (
     ray_weight,
 )
 from pop_core.fitting.robust_loss import Kernel, geman_mcclure_weight
+from pop_core.fitting.self_collision import collision_residual
 from pop_core.retrieval.pose_prior import PosePrior
 
+# Which blocks of `BodyEnergy.residuals` say what; those after the priors are pairs of E_NN.
+JOINT_BLOCKS = slice(0, 2)
+PRIOR_BLOCKS = slice(2, 7)
+PAIR_BLOCKS = slice(7, None)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PriorBelief:
@@ -52,12 +57,14 @@ class TermWeights:
         joints: Of E_J3D.
         prior: Of the pose prior.
         neighbours: Of the conditional prior.
+        collision: Of limbs inside the trunk or each other.
         robust_m: Scale of the robust kernel of E_J3D [m].
     """
 
     joints: float = 1.0
     prior: float = 1.0
     neighbours: float = 1.0
+    collision: float = 0.0
     robust_m: float = 0.15
 
 
@@ -95,6 +102,7 @@ class BodyEnergy:
                 state, belief.pose, belief.sigma_rad, weights.neighbours, jacobian=jacobian),
             limit_prior_residual(state, jacobian=jacobian),
             shape_prior_residual(state, self.scale_weight, jacobian=jacobian),
+            collision_residual(state, weights.collision, jacobian=jacobian),
         ]
         if self.pairs is not None and len(self.pairs.vertex):
             blocks.append(pair_residual(state, self.pairs, jacobian=jacobian))

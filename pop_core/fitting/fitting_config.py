@@ -29,5 +29,8 @@ class FittingConfig:
     neighbour_weight: float = setting(
         0.15, minimum=0.0, maximum=100.0,
         about='Weight of the conditional prior: stay near the retrieved pose where all agree.')
+    collision_weight: float = setting(
+        1.0, minimum=0.0, maximum=100.0,
+        about='Weight of limbs that may not pass through the trunk or each other.')
     free_space: bool = setting(
         True, about='Whether bodies are pushed out of space the sensor saw through.')

@@ -161,7 +161,8 @@ class HypothesisSteps:
         """Return the weights of keypoints and of priors of some strength."""
         config = self.config
         return TermWeights(
-            joints, strength * config.prior_weight, strength * config.neighbour_weight)
+            joints, strength * config.prior_weight, strength * config.neighbour_weight,
+            config.collision_weight)
 
     def _step(
         self,

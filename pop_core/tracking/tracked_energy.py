@@ -9,7 +9,14 @@ from jaxtyping import Float
 from scipy.linalg import cholesky
 
 from pop_core.fitting.body_state import BodyState
-from pop_core.fitting.energy import BodyEnergy, PriorBelief, TermWeights
+from pop_core.fitting.energy import (
+    JOINT_BLOCKS,
+    PAIR_BLOCKS,
+    PRIOR_BLOCKS,
+    BodyEnergy,
+    PriorBelief,
+    TermWeights,
+)
 from pop_core.fitting.levenberg_marquardt import Residual, assemble
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.priors import limit_prior_residual, pose_prior_residual
@@ -86,8 +93,8 @@ class TrackedEnergy:
         blocks = self._energy.residuals(state, True)
         size = state.body.size
         return Curvature(
-            assemble([*blocks[:2], *blocks[6:]], size).hessian,
-            assemble(blocks[2:6], size).hessian), blocks
+            assemble([*blocks[JOINT_BLOCKS], *blocks[PAIR_BLOCKS]], size).hessian,
+            assemble(blocks[PRIOR_BLOCKS], size).hessian), blocks
 
 
 def prior_curvature(

@@ -19,7 +19,7 @@ from pop_core.fitting.depth_consistency import (
     free_space_pairs,
     see_body,
 )
-from pop_core.fitting.energy import TermWeights
+from pop_core.fitting.energy import PAIR_BLOCKS, PRIOR_BLOCKS, TermWeights
 from pop_core.fitting.ground_contact import ground_pairs
 from pop_core.fitting.levenberg_marquardt import (
     FIRST_DAMPING,
@@ -143,8 +143,8 @@ class WarmStart:
             segment = self.fitter.steps.segment(visibility.rendered, observation)
         curvature, blocks = energy.curvature(state)
         energies = {
-            'E_J3D': cost_of(blocks[:1]), 'E_prior': cost_of(blocks[2:6]),
-            'E_NN': cost_of(blocks[6:]),
+            'E_J3D': cost_of(blocks[:1]), 'E_prior': cost_of(blocks[PRIOR_BLOCKS]),
+            'E_NN': cost_of(blocks[PAIR_BLOCKS]),
             'E_depth': depth_energy(visibility.rendered, observation, segment),
         }
         return WarmFit(state, visibility, segment, curvature, energies)

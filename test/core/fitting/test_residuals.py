@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from support.derivatives import assert_is_derivative
 from support.one_person import CAMERA, lift_truth
 
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.fitting.body_state import BodyState, FitBody
-from pop_core.fitting.levenberg_marquardt import Residual
 from pop_core.fitting.observation import keypoint_rays
 from pop_core.fitting.priors import (
     conditional_prior_residual,
@@ -17,8 +17,6 @@ from pop_core.fitting.priors import (
 from pop_core.fitting.residuals import Pairs, joint_residual, pair_residual, ray_residual
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.retrieval.pose_prior import load_pose_prior
-
-STEP = 1e-6
 
 
 @pytest.fixture
@@ -32,18 +30,6 @@ def state(body: BodyModel, person: BodyParameters) -> BodyState:
 @pytest.fixture
 def lifted(body: BodyModel, person: BodyParameters) -> LiftedJoints:
     return lift_truth(body, person)
-
-
-def assert_is_derivative(term: object, state: BodyState) -> None:
-    block: Residual = term(state, True)
-    assert block.J is not None
-    assert len(block.r)
-    for k in range(state.body.size):
-        step = np.zeros(state.body.size)
-        step[k] = STEP
-        ahead, behind = term(state.moved(step), False), term(state.moved(-step), False)
-        numeric = (ahead.r - behind.r) / (2 * STEP)
-        np.testing.assert_allclose(block.J[:, k], numeric, rtol=2e-5, atol=1e-6)
 
 
 def test_joint_term(state: BodyState, lifted: LiftedJoints) -> None:
