@@ -26,6 +26,7 @@ class EstimateStatus(Enum):
     """What became of one detected person; a bad frame is data, not an exception."""
 
     OK = 'fitted'
+    WAITING = 'being fitted, or waiting to be: shown in a later frame'
     TOO_FEW_JOINTS = (
         'fewer lifted joints than min_joints: move closer or check the depth registration'
     )

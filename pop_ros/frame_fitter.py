@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,18 +47,24 @@ class FrameFitter:
         config: NodeConfig,
         progress: Callable[[float, str], None] | None = None,
         frames: StaticFrames | None = None,
+        executor: Executor | None = None,
     ) -> None:
         """Load body model and pose library, and compile kernels.
 
-        `progress` is told a share 0..1 and a sentence while a first library is generated;
-        `frames` knows where a depth camera with a frame of its own stands.
+        Args:
+            detector: Keypoint source.
+            pipeline_config: Settings of the pipeline.
+            config: Settings of messages and of the tracker.
+            progress: Told a share 0..1 and a sentence while a first library is generated.
+            frames: Knows where a depth camera with a frame of its own stands.
+            executor: Finds people anew while others are followed; None lets frames wait for it.
 
         Raises:
             PopError: If one of them cannot be loaded.
         """
         apply_settings(detector, pipeline_config)
         self._pipeline = make_pipeline(detector, pipeline_config, progress=progress)
-        self._tracker = BodyTracker(self._pipeline, config.tracking)
+        self._tracker = BodyTracker(self._pipeline, config.tracking, executor)
         self._messages = BodyMessages(self._pipeline.model, config)
         self._maker = FrameMaker(frames or StaticFrames())
         self._maker.extrinsics = parse_extrinsics(config.depth.extrinsics)
@@ -96,16 +103,26 @@ class FrameFitter:
 
     def fit(
         self, color: Any, depth: Any, info: Any, depth_info: Any = None,
-        *, wanted: Collection[str] = tuple(RECORDED_TYPES),
+        *, wanted: Collection[str] = tuple(RECORDED_TYPES), skipped: int = 0,
     ) -> FittedFrame:
         """Return result and messages of a pair of images and their CameraInfo.
+
+        Args:
+            color: Image or CompressedImage of colour.
+            depth: Image or CompressedImage of depth.
+            info: CameraInfo of the colour camera.
+            depth_info: CameraInfo of the depth camera, or None.
+            wanted: Names of the outputs that messages are made for.
+            skipped: Pairs since the last one that nobody had time for.
 
         Raises:
             BadMessageError: If the messages make no frame.
             PopError: If the keypoint source cannot read what it needs for this frame.
         """
         frame = self._maker.make(color, depth, info, depth_info)
-        tracked = self._tracker.config.enabled
-        result = (self._tracker if tracked else self._pipeline).process(frame)
+        if self._tracker.config.enabled:
+            result = self._tracker.process(frame, skipped)
+        else:
+            result = self._pipeline.process(frame)
         outputs = self._messages.stream(result, frame, color.header.frame_id, wanted)
         return FittedFrame(frame, result, outputs)

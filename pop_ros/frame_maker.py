@@ -70,16 +70,10 @@ class FrameMaker:
         """Return the registration of these cameras; its rays are computed once."""
         known = self._registration
         if known is None or not (
-            same_camera(known.depth_camera, depth_camera)
-            and same_camera(known.color_camera, color_camera)
+            known.depth_camera.sees_like(depth_camera)
+            and known.color_camera.sees_like(color_camera)
             and np.array_equal(known.T_color_depth, T_color_depth)
         ):
             known = DepthRegistration(depth_camera, color_camera, T_color_depth)
             self._registration = known
         return known
-
-
-def same_camera(a: Camera, b: Camera) -> bool:
-    """Return whether two cameras project alike."""
-    sizes = (a.width, a.height, a.distortion_model) == (b.width, b.height, b.distortion_model)
-    return sizes and np.array_equal(a.K, b.K) and np.array_equal(a.d, b.d)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.task import Future
+from threadpoolctl import ThreadpoolController
 
 from pop_core.config import PipelineConfig
 from pop_core.errors import PopError
@@ -50,7 +52,9 @@ class FrameWork:
         self._running = threading.Event()
         self._fitter: FrameFitter | None = None
         self._latest: FittedFrame | None = None
+        self._last_number = 0
         self._said_share = -1.0
+        self._finding = ThreadPoolExecutor(1, 'pop finding people')
         self._worker: Worker[RgbdMessages] = Worker(
             self._fit, self._on_error, lambda: self._prepare(detector, frames))
         self._worker.start()
@@ -100,18 +104,22 @@ class FrameWork:
         self.run(False)
         if self._worker.mailbox.clear():
             self._statistics.add_drop(STOPPED)
-        return self._worker.stop(timeout_s)
+        finished = self._worker.stop(timeout_s)
+        self._finding.shutdown(wait=False, cancel_futures=True)
+        return finished
 
     # Worker thread
 
     def _prepare(self, detector: KeypointDetector, frames: StaticFrames) -> None:
         started_s = time.monotonic()
+        # Two threads fit: the limit that one takes back must not surprise the other.
+        ThreadpoolController().limit(limits=1, user_api='blas')
         self._log.info(
             'preparing; the first start generates the pose library and compiles kernels, later '
             'ones read them from the cache')
         fitter = FrameFitter(
             detector, self._settings.pipeline_config, self._settings.node_config,
-            self._say_progress, frames)
+            self._say_progress, frames, self._finding)
         self._outputs.publish_model(fitter.model)
         self._fitter = fitter
         self.doing = ''
@@ -128,9 +136,11 @@ class FrameWork:
         if self._fitter is None or not self._running.is_set():
             self._statistics.add_drop(STOPPED)
             return
+        skipped = max(messages.number - self._last_number - 1, 0)
+        self._last_number = messages.number
         self._latest = fitted = self._fitter.fit(
             messages.color, messages.depth, messages.info, messages.depth_info,
-            wanted=self._outputs.wanted(self._settings.node_config))
+            wanted=self._outputs.wanted(self._settings.node_config), skipped=skipped)
         self._outputs.publish(fitted.outputs)
         latency_ms = (time.monotonic() - messages.arrival_s) * 1e3
         age_ms = (self._clock.now().nanoseconds - stamp_ns(messages.color.header)) / 1e6

@@ -40,6 +40,7 @@ class RgbdMessages:
         info: sensor_msgs/CameraInfo of the colour camera.
         arrival_s: Steady time at which the pair was complete [s].
         depth_info: sensor_msgs/CameraInfo of the depth camera, or None.
+        number: Counts the pairs, so that whoever takes one knows how many they left out.
     """
 
     color: Any
@@ -47,6 +48,7 @@ class RgbdMessages:
     info: CameraInfo
     arrival_s: float
     depth_info: CameraInfo | None = None
+    number: int = 0
 
 
 class InputTopic:
@@ -134,6 +136,7 @@ class RgbdInputs:
         self._info: CameraInfo | None = None
         self._depth_info: CameraInfo | None = None
         self._without_info: Pair[Any] | None = None
+        self._number = 0
         self.last_frame_s = time.monotonic()
         self._following = False
         self.topics = (
@@ -197,5 +200,7 @@ class RgbdInputs:
                 self._without_info = pair
                 continue
             self.last_frame_s = time.monotonic()
+            self._number += 1
             self._on_frame(RgbdMessages(
-                pair.color, pair.depth, self._info, self.last_frame_s, self._depth_info))
+                pair.color, pair.depth, self._info, self.last_frame_s, self._depth_info,
+                self._number))

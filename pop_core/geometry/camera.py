@@ -88,6 +88,13 @@ class Camera:
         """Return whether any distortion coefficient differs from zero."""
         return bool(np.any(self.d))
 
+    def sees_like(self, other: Camera) -> bool:
+        """Return whether two cameras see the same points at the same pixels."""
+        kind = self.width, self.height, self.distortion_model
+        return (
+            kind == (other.width, other.height, other.distortion_model)
+            and np.array_equal(self.K, other.K) and np.array_equal(self.d, other.d))
+
     def project(self, p_camera: Float[np.ndarray, 'n 3']) -> Float[np.ndarray, 'n 2']:
         """Return pixels of points in the camera frame [m]; points with z <= 0 give NaN."""
         p_camera = np.asarray(p_camera, dtype=np.float64)

@@ -3,13 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from pop_core.estimate import TrackState
 from pop_core.tracking.track import PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
 
-LONG_GAP_S = 0.12  # between two frames: people move far, and there is time to look
+LONG_GAP_S = 0.12  # between two frames of a camera: people move far, and there is time to look
 SOON = 2  # frames from one look to the next while somebody is not followed well
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """What lies between a frame and the one before it.
+
+    Args:
+        duration_s: Time between their stamps [s].
+        skipped: Frames of the camera in between that were left out for lack of time.
+    """
+
+    duration_s: float
+    skipped: int = 0
+
+    @property
+    def is_long(self) -> bool:
+        """Return whether people move far in it."""
+        return self.duration_s > LONG_GAP_S
+
+    @property
+    def is_of_slow_camera(self) -> bool:
+        """Return whether it is the camera that leaves people unseen, and not we."""
+        return self.duration_s / (self.skipped + 1) > LONG_GAP_S
 
 
 class DetectionSchedule:
@@ -18,17 +42,29 @@ class DetectionSchedule:
     def __init__(self, config: TrackingConfig) -> None:
         """Ask at the first frame."""
         self._config = config
-        self._frames_since, self._now_ns = config.detect_every, 0
+        self._frames_since = config.detect_every
 
-    def is_due(self, tracks: Sequence[PersonTrack], now_ns: int) -> bool:
-        """Return whether to look for people in this frame; if so, it counts as done."""
+    def is_due(
+        self, tracks: Sequence[PersonTrack], gap: Gap, *, is_busy: bool = False,
+        is_late: bool = False,
+    ) -> bool:
+        """Return whether to look for people in this frame; if so, it counts as done.
+
+        Args:
+            tracks: Who is followed.
+            gap: Time since the last frame.
+            is_busy: Whether somebody is being fitted, so that nobody else can begin.
+            is_late: Whether a body comes in that was fitted to a frame of some time ago.
+        """
         self._frames_since += 1
+        if not tracks and is_busy and not is_late:
+            return False
         every = self._config.detect_every
         if any(_needs_a_look(track) for track in tracks):
             every = min(every, SOON)
-        gap_s = (now_ns - self._now_ns) * 1e-9
-        self._now_ns = now_ns
-        if tracks and gap_s <= LONG_GAP_S and self._frames_since < every:
+        # A look of our own that took long is no reason for the next.
+        after_gap = gap.is_long and (gap.is_of_slow_camera or self._frames_since > 1)
+        if tracks and not (is_late or after_gap) and self._frames_since < every:
             return False
         self._frames_since = 0
         return True

@@ -24,6 +24,8 @@ from pop_core.tracking.body_filter import (
     predict,
     with_known_shape,
 )
+from pop_core.tracking.fresh_fits import FreshFit
+from pop_core.tracking.late_belief import caught_up, moved_on
 from pop_core.tracking.limbs import contradicted_joints, limb_bones, loosened
 from pop_core.tracking.motion import N_MOVING
 from pop_core.tracking.rivals import costs, follow_alternatives
@@ -68,7 +70,7 @@ class Follower:
 
     def follow(
         self, track: PersonTrack, scene: Scene, lifted: LiftedJoints | None,
-        rival: BodyFit | None = None,
+        rival: FreshFit | None = None,
     ) -> BodyEstimate | None:
         """Return the person in a frame, or None where nothing is given out.
 
@@ -93,12 +95,23 @@ class Follower:
             return self._coast(track, scene, start, visibility)
         return self._accept(track, scene, fit, lifted)
 
-    def restart(self, track: PersonTrack, person: PersonFit) -> None:
+    def restart(
+        self, track: PersonTrack, fresh: FreshFit, lifted: LiftedJoints | None = None
+    ) -> None:
         """Take over a fit that began with retrieved poses; the shape stays the person's."""
-        assert person.fit is not None
-        track.filter = self._found_anew(track, person.fit)
-        self.begin(track, person)
+        track.filter = self._found_anew(track, fresh, lifted)
+        self.begin(track, fresh.person)
+        late_s = (track.now_ns - fresh.stamp_ns) * 1e-9
+        for other in track.alternatives:
+            other.filter = moved_on(other.filter, self.pipeline.fitter.coarse, late_s, lifted)
         track.depth_level = None
+
+    def catch_up(self, track: PersonTrack, lifted: LiftedJoints, late_s: float) -> None:
+        """Move a person who was fitted while time went on to where keypoints are by now."""
+        body = self.pipeline.fitter.coarse
+        track.filter = caught_up(track.filter, body, late_s, lifted)
+        for other in track.alternatives:
+            other.filter = caught_up(other.filter, body, late_s, lifted)
 
     def begin(self, track: PersonTrack, person: PersonFit) -> None:
         """Keep the other explanations of a fresh fit while they may be true."""
@@ -123,11 +136,11 @@ class Follower:
         return fit
 
     def _better(
-        self, track: PersonTrack, fit: WarmFit, rival: BodyFit, observation: Observation
+        self, track: PersonTrack, fit: WarmFit, rival: FreshFit, observation: Observation
     ) -> WarmFit:
         """Return the better of what was followed and what was found anew."""
         track.restarted_ns, track.doubts = track.now_ns, 0
-        belief = self._found_anew(track, rival)
+        belief = self._found_anew(track, rival, observation.lifted)
         other = self.warm.fit(belief, observation, self.config.steps, detected=True)
         ours, theirs = costs(self.warm.fitter, [fit, other], observation)
         if theirs >= ours:
@@ -136,10 +149,16 @@ class Follower:
         track.alternatives.clear()
         return other
 
-    def _found_anew(self, track: PersonTrack, found: BodyFit) -> FilterState:
+    def _found_anew(
+        self, track: PersonTrack, fresh: FreshFit, lifted: LiftedJoints | None
+    ) -> FilterState:
         """Return the belief in a fresh fit of a known person: the shape stays theirs."""
+        found = fresh.person.fit
+        assert found is not None
         belief = first_state(found.parameters, found.hessian)
-        return with_known_shape(belief, track.filter, self.pipeline.model)
+        belief = with_known_shape(belief, track.filter, self.pipeline.model)
+        late_s = (track.now_ns - fresh.stamp_ns) * 1e-9
+        return moved_on(belief, self.pipeline.fitter.coarse, late_s, lifted)
 
     def _without_lost_limbs(
         self, track: PersonTrack, fit: WarmFit, observation: Observation, lifted: LiftedJoints

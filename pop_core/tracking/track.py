@@ -53,6 +53,7 @@ class PersonTrack:
         depth_level: E_depth that is usual for this person [m].
         alternatives: Other explanations.
         shown: Parameters given out last.
+        late_s: How long ago the frame was that the belief is of, if it comes in with this one [s].
     """
 
     id: int
@@ -74,6 +75,7 @@ class PersonTrack:
     depth_level: float | None = None
     alternatives: list[Alternative] = field(default_factory=list)
     shown: BodyParameters | None = None
+    late_s: float = 0.0
 
     @property
     def unseen_s(self) -> float:

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from pop_core.body.joints import SHARED
 from pop_core.depth_noise import USUAL_NOISE, estimate_depth_noise
-from pop_core.estimate import (
-    BodyEstimate,
-    EstimateStatus,
-    FrameResult,
-    JointState,
-    TrackState,
-)
+from pop_core.estimate import BodyEstimate, EstimateStatus, FrameResult, TrackState
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.undistortion import undistort_detection
 from pop_core.pipeline import BodyPipeline, Scene
@@ -24,28 +18,34 @@ from pop_core.segmentation.ground import Ground, find_ground
 from pop_core.stopwatch import Stopwatch
 from pop_core.tracking.association import Expected, associate, offset_m
 from pop_core.tracking.body_filter import first_state
-from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule
+from pop_core.tracking.detection_schedule import DetectionSchedule, Gap
+from pop_core.tracking.doubts import count_misses, is_doubtful, is_settled, is_stale
 from pop_core.tracking.finder import Finder, Found
 from pop_core.tracking.follower import Follower
+from pop_core.tracking.fresh_fits import FreshFit, FreshFits
 from pop_core.tracking.track import PersonTrack, new_track
 from pop_core.tracking.tracking_config import TrackingConfig
 
-STALE_S = 0.25  # unseen for longer, a person is looked for anew
-MOST_DOUBTS, RESTART_EVERY_S = 2, 1.0
-MOST_MISSES = 3
-CLEARLY_SEEN = 8  # shared joints that a body claims the camera sees: a detector would find it
-SETTLED_S = 0.5  # after a body was found
 ASTRAY_M = 0.3  # doubt of the place of somebody whom keypoints contradict
 
 
 class BodyTracker:
     """Follows every person from frame to frame; ids are never given to a second person."""
 
-    def __init__(self, pipeline: BodyPipeline, config: TrackingConfig | None = None) -> None:
-        """Prepare to follow people with a pipeline's model, detector and settings."""
+    def __init__(
+        self, pipeline: BodyPipeline, config: TrackingConfig | None = None,
+        executor: Executor | None = None,
+    ) -> None:
+        """Prepare to follow people with a pipeline's model, detector and settings.
+
+        An executor finds people anew while the others are followed, for use at camera rate;
+        without one each frame waits, so that frames give the same bodies on any machine.
+        """
         self._blas = ThreadpoolController()
+        self._fresh = FreshFits(executor)
         self._next_id = 0
         self._tracks: list[PersonTrack] = []
+        self._gap = Gap(0.0)
         self._last: tuple[Camera, int] | None = None
         self._ground: Ground | None = None
         self._noise = USUAL_NOISE
@@ -62,10 +62,14 @@ class BodyTracker:
         self._forget()
         self._next_id = 0
 
-    def process(self, frame: RgbdFrame) -> FrameResult:
+    def process(self, frame: RgbdFrame, skipped: int = 0) -> FrameResult:
         """Return the people of the next frame, nearest first, each with their track.
 
         A jump back in time or another camera ends all tracks: what follows is another recording.
+
+        Args:
+            frame: The frame.
+            skipped: Frames of the camera since the last one that nobody had time for.
 
         Raises:
             PopError: If the keypoint source cannot read what it needs for this frame.
@@ -73,10 +77,15 @@ class BodyTracker:
         watch = Stopwatch()
         if self._is_another_recording(frame):
             self._forget()
+        since_ns = 0 if self._last is None else frame.stamp_ns - self._last[1]
+        self._gap = Gap(since_ns * 1e-9, skipped)
         self._last = frame.camera, frame.stamp_ns
         with watch.step('undistort'):
             seen = undistort_frame(frame)
-        found = self._look(frame, seen, watch)
+        is_late = self._fresh.poll()
+        if (fresh := self._fresh.take(None)) is not None:
+            self._welcome(fresh, frame.stamp_ns)
+        found = self._look(frame, seen, watch, is_late=is_late)
         with self._blas.limit(limits=1, user_api='blas'):
             bodies, statuses = self._track(seen, found, watch)
         bodies = [replace(b, mask=distort_mask(b.mask, frame.camera)) for b in bodies]
@@ -85,6 +94,7 @@ class BodyTracker:
 
     def _forget(self) -> None:
         self._tracks.clear()
+        self._fresh.forget()
         self._last, self._ground = None, None
         self._schedule = DetectionSchedule(self.config)
 
@@ -92,13 +102,14 @@ class BodyTracker:
         if self._last is None:
             return False
         camera, stamp_ns = self._last
-        return frame.stamp_ns < stamp_ns or not same_camera(camera, frame.camera)
+        return frame.stamp_ns < stamp_ns or not camera.sees_like(frame.camera)
 
     def _look(
-        self, frame: RgbdFrame, seen: RgbdFrame, watch: Stopwatch
+        self, frame: RgbdFrame, seen: RgbdFrame, watch: Stopwatch, *, is_late: bool
     ) -> Found | None:
         """Return the people a detector sees, or None in frames that do without."""
-        if not self._schedule.is_due(self._tracks, frame.stamp_ns):
+        if not self._schedule.is_due(
+                self._tracks, self._gap, is_busy=self._fresh.is_busy, is_late=is_late):
             return None
         with watch.step('detect'):
             detections = self.pipeline.detector.detect(frame)
@@ -127,7 +138,7 @@ class BodyTracker:
         for row in np.argsort([t.filter.parameters.transl[2] for t in self._tracks]).tolist():
             track, index = self._tracks[row], matches.get(row)
             if looked is not None:
-                _count_misses(track, index is not None)
+                count_misses(track, index is not None)
             astray = index is not None and offset_m(
                 expected[row], found.lifted[index]) > self.config.gate_m
             estimate = self._continue(track, scene, found, index, watch, astray=astray)
@@ -141,6 +152,7 @@ class BodyTracker:
                 bodies.append(estimate)
                 scene = replace(scene, taken=scene.taken | estimate.mask)
         self._tracks = [t for t in self._tracks if not t.has_ended(self.config)]
+        self._fresh.forget_unless({track.id for track in self._tracks})
         return bodies, statuses
 
     def _expected(self, track: PersonTrack) -> Expected:
@@ -149,8 +161,7 @@ class BodyTracker:
         Of somebody who comes out from behind a wall the first look sees an arm.
         """
         expected = self._follower.expected(track)
-        settled = (track.now_ns - track.restarted_ns) * 1e-9 > SETTLED_S
-        if settled and track.doubts == 0 and track.misses == 0:
+        if is_settled(track):
             return expected
         return replace(expected, doubt_m=max(expected.doubt_m, ASTRAY_M))
 
@@ -159,21 +170,30 @@ class BodyTracker:
         watch: Stopwatch, *, astray: bool,
     ) -> BodyEstimate | None:
         """Return a known person in this frame, or None where nothing is given out."""
-        lifted, rival = None, None
+        lifted, elsewhere = None, is_stale(track)
+        fresh = self._fresh.take(track.id)
+        late_s, track.late_s = track.late_s, 0.0
         if index is not None:
             lifted = self._finder.lifted_behind(scene, found, index)
-            elsewhere = astray or _is_stale(track)
-            if elsewhere or _is_doubtful(track):
+            elsewhere = elsewhere or astray
+            if late_s > 0.0:
+                self._follower.catch_up(track, lifted, late_s)
+            elif fresh is None and (elsewhere or is_doubtful(track, self._gap)):
                 with watch.step('restart'):
-                    person = self._finder.fit(scene, found, index)
-                if elsewhere and person.fit is not None:
-                    self._follower.restart(track, person)
-                else:
-                    rival = person.fit
-        if track.state is TrackState.LOST and lifted is None:
+                    self._ask(scene, found, index, track.id)
+                fresh = self._fresh.take(track.id)
+        rival = fresh if fresh is not None and fresh.person.fit is not None else None
+        if rival is not None and elsewhere:
+            self._follower.restart(track, rival, lifted)
+        elif track.state is TrackState.LOST and lifted is None:
             return None
         with watch.step('follow'):
-            return self._follower.follow(track, scene, lifted, rival)
+            return self._follower.follow(track, scene, lifted, None if elsewhere else rival)
+
+    def _ask(self, scene: Scene, found: Found, index: int, number: int | None = None) -> None:
+        """Have a detected person fitted from retrieved poses."""
+        self._fresh.ask(
+            lambda: self._finder.fit(scene, found, index), number, scene.frame.stamp_ns)
 
     def _begin(
         self, scene: Scene, found: Found, index: int, watch: Stopwatch
@@ -182,42 +202,25 @@ class BodyTracker:
         if len(self._tracks) >= self.pipeline.config.max_people:
             return EstimateStatus.OK, None
         with watch.step('begin'):
-            person = self._finder.fit(scene, found, index)
+            self._ask(scene, found, index)
+        fresh = self._fresh.take(None)
+        if fresh is None:
+            return EstimateStatus.WAITING, None
+        track = self._welcome(fresh, scene.frame.stamp_ns)
+        if track is None or fresh.person.estimate is None:
+            return fresh.person.status, None
+        return fresh.person.status, replace(fresh.person.estimate, track=track.tag())
+
+    def _welcome(self, fresh: FreshFit, now_ns: int) -> PersonTrack | None:
+        """Return a new track of whoever was found, at the time of the frame that was fitted."""
+        person = fresh.person
         if person.estimate is None or person.fit is None:
-            return person.status, None
+            return None
         track = new_track(
             self._next_id, first_state(person.fit.parameters, person.fit.hessian),
-            person.estimate, person.estimate.score, scene.frame.stamp_ns)
+            person.estimate, person.estimate.score, fresh.stamp_ns)
+        track.late_s = (now_ns - fresh.stamp_ns) * 1e-9
         self._next_id += 1
         self._follower.begin(track, person)
         self._tracks.append(track)
-        return person.status, replace(person.estimate, track=track.tag())
-
-
-def same_camera(camera: Camera, other: Camera) -> bool:
-    """Return whether two cameras see the same points at the same pixels."""
-    size = (camera.width, camera.height, camera.distortion_model)
-    return (
-        size == (other.width, other.height, other.distortion_model)
-        and np.array_equal(camera.K, other.K) and np.array_equal(camera.d, other.d))
-
-
-def _is_stale(track: PersonTrack) -> bool:
-    """Return whether too much may have happened unseen for a prediction to be of use."""
-    return track.unseen_s - track.gap_s > STALE_S
-
-
-def _is_doubtful(track: PersonTrack) -> bool:
-    """Return whether a prediction should be compared with a body found anew."""
-    if track.gap_s > LONG_GAP_S:
-        return True
-    since_s = (track.now_ns - track.restarted_ns) * 1e-9
-    return track.doubts >= MOST_DOUBTS and since_s > RESTART_EVERY_S
-
-
-def _count_misses(track: PersonTrack, was_detected: bool) -> None:
-    """Give up a body that no further look for people confirms: a new one, or one in full view."""
-    track.misses = 0 if was_detected else track.misses + 1
-    clear = (track.joint_state[SHARED] == JointState.VISIBLE).sum() >= CLEARLY_SEEN
-    if track.misses >= MOST_MISSES and (track.state is TrackState.NEW or clear):
-        track.state = TrackState.LOST
+        return track

@@ -4,71 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.one_person import CAMERA, photograph
+from support.one_person import CAMERA
+from support.stage import RATE_HZ, Stage, only
 
-from pop_core.body.kinematics import attached_positions, joints
-from pop_core.body.model import BodyModel, BodyParameters, shared_points
-from pop_core.estimate import BodyEstimate, TrackState
-from pop_core.keypoints.detection import Detection
-from pop_core.pipeline import BodyPipeline
-from pop_core.retrieval.default_library import default_library
-from pop_core.rgbd import RgbdFrame
-from pop_core.tracking.tracker import BodyTracker
+from pop_core.body.kinematics import joints
+from pop_core.body.model import BodyModel, BodyParameters
+from pop_core.estimate import TrackState
 from pop_core.tracking.tracking_config import TrackingConfig
-
-RATE_HZ = 15.0
-BOARD_M = 1.5  # something in front of everything
-
-
-class Scripted:
-    """A keypoint source that knows the truth and counts how often it is asked."""
-
-    def __init__(self, body: BodyModel) -> None:
-        self.body, self.person, self.asked = body, None, 0
-
-    def detect(self, frame: RgbdFrame) -> list[Detection]:
-        self.asked += 1
-        if self.person is None:
-            return []
-        points = attached_positions(shared_points(self.body), self.body, self.person)
-        uv = frame.camera.project(points)
-        box = np.concatenate([uv.min(axis=0), uv.max(axis=0)])
-        return [Detection(uv, np.full(15, 0.9), box)]
-
-
-class Stage:
-    """A tracker, what it sees, and the clock."""
-
-    def __init__(self, body: BodyModel, config: TrackingConfig | None = None) -> None:
-        self.body, self.source = body, Scripted(body)
-        pipeline = BodyPipeline(body, default_library(), self.source)
-        self.tracker = BodyTracker(pipeline, config)
-        self.stamp_ns = 1_000_000_000
-
-    def show(
-        self, person: BodyParameters | None, *, hidden: bool = False, times: int = 1
-    ) -> list[BodyEstimate]:
-        """Show a person, an empty room, or a board before it; the last frame's bodies."""
-        for _ in range(times):
-            self.stamp_ns += round(1e9 / RATE_HZ)
-            frame = self.frame(person, hidden=hidden)
-            self.source.person = None if hidden else person
-            bodies = list(self.tracker.process(frame).bodies)
-        return bodies
-
-    def frame(self, person: BodyParameters | None, *, hidden: bool) -> RgbdFrame:
-        behind = BodyParameters(
-            np.array([0.0, 0.0, -5.0]), np.zeros(3), np.zeros((23, 3)), np.zeros(10))
-        frame = photograph(self.body, behind if person is None else person)
-        if hidden:
-            frame = replace(frame, depth_m=np.full_like(frame.depth_m, BOARD_M))
-        return replace(frame, stamp_ns=self.stamp_ns)
-
-
-def only(bodies: list[BodyEstimate]) -> BodyEstimate:
-    assert len(bodies) == 1
-    assert bodies[0].track is not None
-    return bodies[0]
 
 
 @pytest.fixture

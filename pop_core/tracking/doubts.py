@@ -1,0 +1,46 @@
+"""When what is believed of a person is to be looked for anew, or to be given up."""
+
+from __future__ import annotations
+
+from pop_core.body.joints import SHARED
+from pop_core.estimate import JointState, TrackState
+from pop_core.tracking.detection_schedule import Gap
+from pop_core.tracking.track import PersonTrack
+
+STALE_S = 0.25  # unseen for longer, a person is looked for anew
+MOST_DOUBTS, RESTART_EVERY_S = 2, 1.0
+MOST_MISSES = 3
+CLEARLY_SEEN = 8  # shared joints that a body claims the camera sees: a detector would find it
+SETTLED_S = 0.5  # after a body was found
+
+
+def is_stale(track: PersonTrack) -> bool:
+    """Return whether too much may have happened unseen for a prediction to be of use."""
+    return track.unseen_s - track.gap_s > STALE_S
+
+
+def is_doubtful(track: PersonTrack, gap: Gap) -> bool:
+    """Return whether a prediction should be compared with a body found anew.
+
+    Long gaps of our own making are no reason: they would only grow.
+    """
+    if gap.is_of_slow_camera:
+        return True
+    return track.doubts >= MOST_DOUBTS and _restarted_ago_s(track) > RESTART_EVERY_S
+
+
+def is_settled(track: PersonTrack) -> bool:
+    """Return whether the place of a person is sure, as far as keypoints tell."""
+    return _restarted_ago_s(track) > SETTLED_S and track.doubts == 0 and track.misses == 0
+
+
+def count_misses(track: PersonTrack, was_detected: bool) -> None:
+    """Give up a body that no further look for people confirms: a new one, or one in full view."""
+    track.misses = 0 if was_detected else track.misses + 1
+    clear = (track.joint_state[SHARED] == JointState.VISIBLE).sum() >= CLEARLY_SEEN
+    if track.misses >= MOST_MISSES and (track.state is TrackState.NEW or clear):
+        track.state = TrackState.LOST
+
+
+def _restarted_ago_s(track: PersonTrack) -> float:
+    return (track.now_ns - track.restarted_ns) * 1e-9

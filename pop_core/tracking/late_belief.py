@@ -1,0 +1,47 @@
+"""Beliefs of a frame of some time ago, moved on to the present one: a fit takes its time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pop_core.fitting.body_state import FitBody
+from pop_core.keypoints.lifted_joints import LiftedJoints
+from pop_core.tracking.body_filter import FilterState, predict
+
+
+def moved_on(
+    belief: FilterState, body: FitBody, late_s: float, lifted: LiftedJoints | None
+) -> FilterState:
+    """Return a belief of a frame of `late_s` ago [s] at the present time.
+
+    Args:
+        belief: The belief.
+        body: The body it is of.
+        late_s: Time since the frame; 0 changes nothing.
+        lifted: The person's joints of the present frame, if they were detected in it.
+    """
+    if late_s <= 0.0:
+        return belief
+    moved = predict(belief, body.model, late_s)
+    return moved if lifted is None else caught_up(moved, body, late_s, lifted)
+
+
+def caught_up(
+    predicted: FilterState, body: FitBody, late_s: float, lifted: LiftedJoints
+) -> FilterState:
+    """Return a predicted belief after the step that keypoints have taken meanwhile.
+
+    Who walks has left the place where a slow fit found them; the step is the median over joints,
+    some of which were lifted onto something else.
+    """
+    rows = lifted.lifted
+    if not rows.any():
+        return predicted
+    points = body.state(predicted.parameters).landmarks[rows]
+    step = np.median(lifted.positions_camera[rows] - points, axis=0)
+    velocity = predicted.velocity.copy()
+    velocity[:3] += step / late_s
+    parameters = predicted.parameters.replaced(transl=predicted.parameters.transl + step)
+    return replace(predicted, velocity=velocity, parameters=parameters)
