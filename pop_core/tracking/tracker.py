@@ -85,8 +85,8 @@ class BodyTracker:
         is_late = self._fresh.poll()
         if (fresh := self._fresh.take(None)) is not None:
             self._welcome(fresh, frame.stamp_ns)
-        found = self._look(frame, seen, watch, is_late=is_late)
         with self._blas.limit(limits=1, user_api='blas'):
+            found = self._look(frame, seen, watch, is_late=is_late)
             bodies, statuses = self._track(seen, found, watch)
         bodies = [replace(b, mask=distort_mask(b.mask, frame.camera)) for b in bodies]
         bodies.sort(key=lambda body: float(body.joints[0, 2]))
