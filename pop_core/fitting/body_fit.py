@@ -19,6 +19,7 @@ from pop_core.fitting.levenberg_marquardt import assemble, cost_of
 from pop_core.fitting.limb_exchange import Judge, exchange_limbs
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.priors import neighbour_sigma_rad
+from pop_core.fitting.readings import best_facing, best_reading
 from pop_core.retrieval.candidate import PoseCandidate
 from pop_core.retrieval.pose_prior import PosePrior
 from pop_core.segmentation.body_segmentation import SegmentationConfig
@@ -26,6 +27,7 @@ from pop_core.segmentation.body_segmentation import SegmentationConfig
 # The robust kernel shrinks as the body settles [m].
 EARLY_SCALES_M = (WIDEST_M, 0.13, 0.11, 0.09)
 LATE_SCALES_M = (0.08, 0.06, 0.045, 0.035, 0.03)
+TURNED_SCHEDULE = ((EARLY_SCALES_M[-2:], False), (LATE_SCALES_M, True))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,6 +42,7 @@ class BodyFit:
         segment: Pixels of the observation that show the person.
         energies: Final energies by name.
         runners_up: The other finalists, best first.
+        sides_exchanged: Whether the keypoints' left turned out to be right.
     """
 
     parameters: BodyParameters
@@ -49,6 +52,7 @@ class BodyFit:
     segment: Bool[np.ndarray, 'h w']
     energies: dict[str, float]
     runners_up: tuple[BodyParameters, ...]
+    sides_exchanged: bool = False
 
 
 class BodyFitter:
@@ -86,11 +90,17 @@ class BodyFitter:
         hypotheses = [
             exchange_limbs(hypothesis, [h for h in started if h is not hypothesis], judge)
             for hypothesis in _best(hypotheses, self.config.final_hypotheses)]
+        if self.config.other_readings:
+            hypotheses = [best_reading(each, observation, judge) for each in hypotheses]
         for hypothesis in hypotheses:
             self.steps.fit_surface(hypothesis, observation, LATE_SCALES_M, free_space=True)
         self._judge(hypotheses, observation)(hypotheses)
         winner, *others = _best(hypotheses, len(hypotheses))
-        return self._finish(self._polished(winner, observation), others, observation)
+        named = observation
+        if self.config.other_readings:
+            winner, named = best_facing(winner, observation, self.steps, TURNED_SCHEDULE)
+        body = self._finish(self._polished(winner, named), others, named)
+        return replace(body, sides_exchanged=named is not observation)
 
     def _start(self, candidate: PoseCandidate, all_of_them: Sequence[PoseCandidate]) -> Hypothesis:
         parameters = initial_parameters(self.model, candidate)

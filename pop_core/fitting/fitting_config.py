@@ -32,5 +32,8 @@ class FittingConfig:
     collision_weight: float = setting(
         1.0, minimum=0.0, maximum=100.0,
         about='Weight of limbs that may not pass through the trunk or each other.')
+    other_readings: bool = setting(
+        True,
+        about='Whether bodies are tried turned about, legs exchanged, limbs rolled back, too.')
     free_space: bool = setting(
         True, about='Whether bodies are pushed out of space the sensor saw through.')

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
+from pop_core.body.joints import MIRROR, SHARED_MIRROR
 from pop_core.depth_noise import USUAL_NOISE, DepthNoise
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.lifted_joints import LiftedJoints
@@ -96,6 +97,14 @@ class Observation:
         """Return the measured points of a mask [m], camera frame, in row order."""
         z = self.depth_m[mask].astype(np.float64)
         return np.column_stack([self.rays[mask] * z[:, None], z])
+
+    def with_sides_exchanged(self) -> Observation:
+        """Return the observation with everything that was called left called right."""
+        rays, labels = self.keypoint_rays, self.labels
+        return replace(
+            self, lifted=self.lifted.with_sides_exchanged(),
+            keypoint_rays=replace(rays, joint=SHARED_MIRROR[rays.joint]),
+            labels=None if labels is None else np.where(labels < 0, -1, MIRROR[labels]))
 
     def depth_at(
         self, p_camera: Float[np.ndarray, 'n 3']

@@ -17,6 +17,8 @@ def plausibility(fit: BodyFit, lifted: LiftedJoints) -> float:
     Depth alone agrees with many wrong bodies: a person's jacket over a chair, say, or half a
     person whose other half was taken for somebody else's.
     """
+    if fit.sides_exchanged:
+        lifted = lifted.with_sides_exchanged()
     rows = lifted.lifted
     off_m = np.linalg.norm(fit.coarse.landmarks - lifted.positions_camera, axis=1)[rows]
     weight = lifted.scores[rows]

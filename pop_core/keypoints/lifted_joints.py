@@ -8,6 +8,8 @@ from enum import IntEnum
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from pop_core.body.joints import SHARED_MIRROR
+
 
 class LiftState(IntEnum):
     """What became of a keypoint when it was lifted."""
@@ -53,3 +55,10 @@ class LiftedJoints:
     def lifted(self) -> Bool[np.ndarray, 's']:
         """Return which joints have a position."""
         return np.isfinite(self.positions_camera).all(axis=1)
+
+    def with_sides_exchanged(self) -> LiftedJoints:
+        """Return the joints with every left one called right, and the other way round."""
+        return LiftedJoints(
+            self.positions_camera[SHARED_MIRROR], self.sigma_m[SHARED_MIRROR],
+            self.state[SHARED_MIRROR], self.keypoints_px[SHARED_MIRROR],
+            self.scores[SHARED_MIRROR])
