@@ -1,8 +1,8 @@
 """Bodies fitted from retrieved poses for a tracker: at once, or while it follows the others.
 
 Such a fit takes as long as ten tracked frames. Given an executor it runs beside them, one at a
-time, and what it found is moved on to the frame in which it is ready. Without one, which is the
-default, every frame waits for its fits, so that results do not depend on the machine.
+time, and what it found is moved on to the frame in which it is ready. Without one, the default,
+every frame waits for its fits, so that results do not depend on the machine.
 """
 
 from __future__ import annotations
@@ -64,11 +64,21 @@ class FreshFits:
         self._asked.is_ready = self._asked.future.done()
         return self._asked.is_ready
 
-    def ask(self, fit: Callable[[], PersonFit], track: int | None, stamp_ns: int) -> None:
-        """Have a person fitted, unless another fit is being made."""
+    def ask(
+        self, fit: Callable[[], PersonFit], track: int | None, stamp_ns: int, *, wait: bool
+    ) -> None:
+        """Have a person fitted, unless another fit is being made.
+
+        Args:
+            fit: Fits the person.
+            track: Number of the person's track; None for somebody new.
+            stamp_ns: Stamp of the frame that is fitted.
+            wait: Whether to have it at once, since nobody is kept waiting.
+        """
         if not self.is_busy:
             self._asked = (
-                Asked(track, stamp_ns, _done(fit()), is_ready=True) if self._executor is None
+                Asked(track, stamp_ns, _done(fit()), is_ready=True)
+                if wait or self._executor is None
                 else Asked(track, stamp_ns, self._executor.submit(fit)))
 
     def take(self, track: int | None) -> FreshFit | None:

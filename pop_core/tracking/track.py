@@ -53,7 +53,6 @@ class PersonTrack:
         depth_level: E_depth that is usual for this person [m].
         alternatives: Other explanations.
         shown: Parameters given out last.
-        late_s: How long ago the frame was that the belief is of, if it comes in with this one [s].
     """
 
     id: int
@@ -75,12 +74,16 @@ class PersonTrack:
     depth_level: float | None = None
     alternatives: list[Alternative] = field(default_factory=list)
     shown: BodyParameters | None = None
-    late_s: float = 0.0
 
     @property
     def unseen_s(self) -> float:
         """Return for how long nothing of the person was seen [s]."""
         return (self.now_ns - self.seen_ns) * 1e-9
+
+    @property
+    def has_just_begun(self) -> bool:
+        """Return whether one frame is all that is known of the person."""
+        return self.hits == 1
 
     @property
     def is_shown(self) -> bool:

@@ -18,7 +18,7 @@ from pop_core.segmentation.ground import Ground, find_ground
 from pop_core.stopwatch import Stopwatch
 from pop_core.tracking.association import Expected, associate, offset_m
 from pop_core.tracking.body_filter import first_state
-from pop_core.tracking.detection_schedule import DetectionSchedule, Gap
+from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, Gap
 from pop_core.tracking.doubts import count_misses, is_doubtful, is_settled, is_stale
 from pop_core.tracking.finder import Finder, Found
 from pop_core.tracking.follower import Follower
@@ -77,14 +77,15 @@ class BodyTracker:
         watch = Stopwatch()
         if self._is_another_recording(frame):
             self._forget()
-        since_ns = 0 if self._last is None else frame.stamp_ns - self._last[1]
-        self._gap = Gap(since_ns * 1e-9, skipped)
+        self._gap = Gap(
+            np.inf if self._last is None else (frame.stamp_ns - self._last[1]) * 1e-9, skipped)
         self._last = frame.camera, frame.stamp_ns
         with watch.step('undistort'):
             seen = undistort_frame(frame)
-        is_late = self._fresh.poll()
+        is_late = self._fresh.poll() or (
+            self._gap.is_long and any(track.has_just_begun for track in self._tracks))
         if (fresh := self._fresh.take(None)) is not None:
-            self._welcome(fresh, frame.stamp_ns)
+            self._welcome(fresh)
         with self._blas.limit(limits=1, user_api='blas'):
             found = self._look(frame, seen, watch, is_late=is_late)
             bodies, statuses = self._track(seen, found, watch)
@@ -172,12 +173,12 @@ class BodyTracker:
         """Return a known person in this frame, or None where nothing is given out."""
         lifted, elsewhere = None, is_stale(track)
         fresh = self._fresh.take(track.id)
-        late_s, track.late_s = track.late_s, 0.0
         if index is not None:
             lifted = self._finder.lifted_behind(scene, found, index)
             elsewhere = elsewhere or astray
-            if late_s > 0.0:
-                self._follower.catch_up(track, lifted, late_s)
+            is_late = track.has_just_begun and track.gap_s > LONG_GAP_S
+            if is_late and not self._gap.is_of_slow_camera:
+                self._follower.catch_up(track, lifted)
             elif fresh is None and (elsewhere or is_doubtful(track, self._gap)):
                 with watch.step('restart'):
                     self._ask(scene, found, index, track.id)
@@ -193,7 +194,8 @@ class BodyTracker:
     def _ask(self, scene: Scene, found: Found, index: int, number: int | None = None) -> None:
         """Have a detected person fitted from retrieved poses."""
         self._fresh.ask(
-            lambda: self._finder.fit(scene, found, index), number, scene.frame.stamp_ns)
+            lambda: self._finder.fit(scene, found, index), number, scene.frame.stamp_ns,
+            wait=self._gap.is_of_slow_camera or not any(t.is_shown for t in self._tracks))
 
     def _begin(
         self, scene: Scene, found: Found, index: int, watch: Stopwatch
@@ -206,12 +208,12 @@ class BodyTracker:
         fresh = self._fresh.take(None)
         if fresh is None:
             return EstimateStatus.WAITING, None
-        track = self._welcome(fresh, scene.frame.stamp_ns)
+        track = self._welcome(fresh)
         if track is None or fresh.person.estimate is None:
             return fresh.person.status, None
         return fresh.person.status, replace(fresh.person.estimate, track=track.tag())
 
-    def _welcome(self, fresh: FreshFit, now_ns: int) -> PersonTrack | None:
+    def _welcome(self, fresh: FreshFit) -> PersonTrack | None:
         """Return a new track of whoever was found, at the time of the frame that was fitted."""
         person = fresh.person
         if person.estimate is None or person.fit is None:
@@ -219,7 +221,6 @@ class BodyTracker:
         track = new_track(
             self._next_id, first_state(person.fit.parameters, person.fit.hessian),
             person.estimate, person.estimate.score, fresh.stamp_ns)
-        track.late_s = (now_ns - fresh.stamp_ns) * 1e-9
         self._next_id += 1
         self._follower.begin(track, person)
         self._tracks.append(track)

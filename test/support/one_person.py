@@ -22,11 +22,12 @@ def facing_person(betas: np.ndarray) -> BodyParameters:
     return BodyParameters(np.array([0.1, 0.1, 2.5]), np.array([np.pi, 0, 0]), pose, betas)
 
 
-def photograph(body: BodyModel, person: BodyParameters) -> RgbdFrame:
-    """The person before a wall, without noise."""
-    depth = render_depth(vertices(body, person), body.f, CAMERA).depth_m
+def photograph(body: BodyModel, *people: BodyParameters) -> RgbdFrame:
+    """Somebody before a wall, without noise."""
+    depths = [render_depth(vertices(body, p), body.f, CAMERA).depth_m for p in people]
+    wall = np.full((CAMERA.height, CAMERA.width), WALL_M, dtype=np.float32)
     rgb = np.zeros((CAMERA.height, CAMERA.width, 3), dtype=np.uint8)
-    return RgbdFrame(rgb, np.minimum(depth, np.float32(WALL_M)), CAMERA)
+    return RgbdFrame(rgb, np.minimum.reduce([wall, *depths]), CAMERA)
 
 
 def lift_truth(

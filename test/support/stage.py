@@ -24,16 +24,17 @@ class Scripted:
     """A keypoint source that knows the truth and counts how often it is asked."""
 
     def __init__(self, body: BodyModel) -> None:
-        self.body, self.person, self.asked = body, None, 0
+        self.body, self.people, self.asked = body, [], 0
 
     def detect(self, frame: RgbdFrame) -> list[Detection]:
         self.asked += 1
-        if self.person is None:
-            return []
-        points = attached_positions(shared_points(self.body), self.body, self.person)
+        return [self.detection(frame, person) for person in self.people]
+
+    def detection(self, frame: RgbdFrame, person: BodyParameters) -> Detection:
+        points = attached_positions(shared_points(self.body), self.body, person)
         uv = frame.camera.project(points)
         box = np.concatenate([uv.min(axis=0), uv.max(axis=0)])
-        return [Detection(uv, np.full(15, 0.9), box)]
+        return Detection(uv, np.full(15, 0.9), box)
 
 
 class Stage:
@@ -49,14 +50,13 @@ class Stage:
         self.stamp_ns, self.statuses = 1_000_000_000, ()
 
     def show(
-        self, person: BodyParameters | None, *, hidden: bool = False, times: int = 1,
-        skipped: int = 0,
+        self, *people: BodyParameters, hidden: bool = False, times: int = 1, skipped: int = 0,
     ) -> list[BodyEstimate]:
-        """Show a person, an empty room, or a board before it; the last frame's bodies."""
+        """Show people, an empty room, or a board before it; the last frame's bodies."""
         for _ in range(times):
             self.stamp_ns += round(1e9 / RATE_HZ)
-            frame = self.frame(person, hidden=hidden)
-            self.source.person = None if hidden else person
+            frame = self.frame(*people, hidden=hidden)
+            self.source.people = [] if hidden else list(people)
             result = self.tracker.process(frame, skipped)
             bodies, self.statuses = list(result.bodies), result.statuses
         return bodies
@@ -69,10 +69,8 @@ class Stage:
         fitter.fit = lambda *args: fits.append(1) or fit(*args)
         return fits
 
-    def frame(self, person: BodyParameters | None, *, hidden: bool) -> RgbdFrame:
-        behind = BodyParameters(
-            np.array([0.0, 0.0, -5.0]), np.zeros(3), np.zeros((23, 3)), np.zeros(10))
-        frame = photograph(self.body, behind if person is None else person)
+    def frame(self, *people: BodyParameters, hidden: bool) -> RgbdFrame:
+        frame = photograph(self.body, *people)
         if hidden:
             frame = replace(frame, depth_m=np.full_like(frame.depth_m, BOARD_M))
         return replace(frame, stamp_ns=self.stamp_ns)

@@ -80,7 +80,7 @@ def test_somebody_found_later_is_somebody_new(stage: Stage, person: BodyParamete
 
 def test_somebody_who_is_gone_is_not_given_out(stage: Stage, person: BodyParameters) -> None:
     stage.show(person, times=5)
-    assert stage.show(None) == []
+    assert stage.show() == []
 
 
 def test_a_jump_back_in_time_begins_anew_with_new_ids(
