@@ -13,6 +13,7 @@ from pop_core.estimate import EstimateStatus, TrackState
 from pop_core.pipeline import PersonFit
 from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, Gap
 from pop_core.tracking.fresh_fits import FreshFits
+from pop_core.tracking.track import PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
 
 STEP_M = 0.05
@@ -163,17 +164,25 @@ def test_a_gap_of_our_own_making_is_no_slow_camera() -> None:
     assert not Gap(LONG_GAP_S / 2).is_long
 
 
-def test_a_long_look_is_no_reason_for_the_next_one(stage: Stage, person: BodyParameters) -> None:
+@pytest.fixture(scope='module')
+def tracks(body: BodyModel, person: BodyParameters) -> list[PersonTrack]:
+    """Somebody who is followed well."""
+    stage = Stage(body)
+    stage.show(person, times=4)
+    return stage.tracker._tracks
+
+
+QUICK = Gap(1 / 30)
+
+
+def test_a_long_look_is_no_reason_for_the_next_one(tracks: list[PersonTrack]) -> None:
     schedule = DetectionSchedule(TrackingConfig(detect_every=3))
-    followed = Stage(stage.body)
-    followed.show(person, times=4)
-    tracks = followed.tracker._tracks
-    slow, own, quick = Gap(0.3), Gap(0.3, skipped=8), Gap(1 / 30)
-    assert schedule.is_due(tracks, quick)
+    slow, own = Gap(0.3), Gap(0.3, skipped=8)
+    assert schedule.is_due(tracks, QUICK)
     assert not schedule.is_due(tracks, own)  # the look before took that long
     assert schedule.is_due(tracks, own)  # something else did
     assert schedule.is_due(tracks, slow)
-    assert [schedule.is_due(tracks, quick) for _ in range(4)] == [False, False, True, False]
+    assert [schedule.is_due(tracks, QUICK) for _ in range(4)] == [False, False, True, False]
 
 
 def test_a_node_that_was_slow_once_does_not_stay_slow(
