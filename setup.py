@@ -60,7 +60,7 @@ setup(
     },
     entry_points={
         'console_scripts': [
-            'pop = pop_ros.cli:main', 'pop_node = pop_ros.node:main',
+            'pop = pop_ros.__main__:main', 'pop_node = pop_ros.node:main',
             'pop_viewer = pop_ros.viewer_command:main'],
     },
 )

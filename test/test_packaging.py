@@ -49,5 +49,5 @@ def test_a_wheel_leaves_tests_and_benchmarks_at_home(wheel):
 def test_a_wheel_installs_the_commands(wheel):
     name = next(n for n in wheel.namelist() if n.endswith('entry_points.txt'))
     text = wheel.read(name).decode()
-    assert 'pop = pop_ros.cli:main' in text
+    assert 'pop = pop_ros.__main__:main' in text
     assert 'pop_node = pop_ros.node:main' in text

@@ -175,14 +175,10 @@ def check_snapshot(player: Player, shots: Path, recording: Recording) -> None:
     np.testing.assert_allclose(repeated['joints'], found['joints'], atol=0.02)
 
 
-@pytest.mark.parametrize('delay_s', [0.15, 0.4, 0.8])
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_while_modules_are_imported_ends_the_node_cleanly(
-    recording: Recording, number: signal.Signals, delay_s: float
-) -> None:
+def stopped(main: str, number: signal.Signals, delay_s: float) -> tuple[int, str]:
+    """Start a program, send a signal soon after; return its exit code and what it complained."""
     # Python itself must have started: before that no program can catch anything.
-    code = f'import sys; sys.path.insert(0, {str(ROOT)!r}); import pop_ros.node as n; print("up", '
-    code += f'flush=True); sys.exit(n.main({flags(recording)!r}))'
+    code = f'import sys; sys.path.insert(0, {str(ROOT)!r}); print("up", flush=True); {main}'
     process = subprocess.Popen(
         [sys.executable, '-c', code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -190,7 +186,27 @@ def test_a_signal_while_modules_are_imported_ends_the_node_cleanly(
     time.sleep(delay_s)
     process.send_signal(number)
     _, errors = process.communicate(timeout=30)
-    assert process.returncode == 0, errors
+    return process.returncode, errors
+
+
+@pytest.mark.parametrize('delay_s', [0.15, 0.4, 0.8])
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_modules_are_imported_ends_the_node_cleanly(
+    recording: Recording, number: signal.Signals, delay_s: float
+) -> None:
+    main = f'import pop_ros.node as n; sys.exit(n.main({flags(recording)!r}))'
+    code, errors = stopped(main, number, delay_s)
+    assert code == 0, errors
+    assert 'Traceback' not in errors
+
+
+@pytest.mark.parametrize('delay_s', [0.05, 0.2, 0.4, 0.8])
+def test_ctrl_c_while_the_command_line_loads_leaves_no_traceback(
+    recording: Recording, delay_s: float
+) -> None:
+    main = f'from pop_ros.__main__ import main; sys.argv[1:] = {["node", *flags(recording)]!r}; '
+    code, errors = stopped(f'{main} main()', signal.SIGINT, delay_s)
+    assert code in (0, 130), errors
     assert 'Traceback' not in errors
 
 
