@@ -40,9 +40,7 @@ USUAL_NOISE = DepthNoise()
 
 def estimate_depth_noise(depth_m: Float32[np.ndarray, 'h w']) -> DepthNoise:
     """Return the noise of a depth image [m]; the usual one where too little was measured."""
-    with np.errstate(divide='ignore', invalid='ignore'):
-        inverse = np.where(depth_m > 0, 1.0 / depth_m, np.nan)
-    bends = np.concatenate([_bends(inverse), _bends(inverse.T)])
+    bends = np.concatenate([_bends(depth_m), _bends(depth_m.T)])
     bends = bends[np.isfinite(bends)]
     if len(bends) < LEAST_SAMPLES:
         return USUAL_NOISE
@@ -50,7 +48,14 @@ def estimate_depth_noise(depth_m: Float32[np.ndarray, 'h w']) -> DepthNoise:
     return DepthNoise(float(MAD_TO_SIGMA * np.median(np.abs(bends)) / np.sqrt(6.0)))
 
 
-def _bends(inverse: Float[np.ndarray, 'h w']) -> Float[np.ndarray, 'n']:
-    rows = inverse[::STEP_PX]
-    before, here, after = rows[:, : -2 * LAG_PX], rows[:, LAG_PX: -LAG_PX], rows[:, 2 * LAG_PX:]
-    return (before - 2.0 * here + after)[:, ::STEP_PX].reshape(-1)
+def _bends(depth_m: Float32[np.ndarray, 'h w']) -> Float32[np.ndarray, 'n']:
+    """Return second differences of inverse depth along rows; NaN where one is missing."""
+    end = max(depth_m.shape[1] - 2 * LAG_PX, 0)
+    before, here, after = (
+        _inverse(depth_m[::STEP_PX, k: end + k: STEP_PX]) for k in (0, LAG_PX, 2 * LAG_PX))
+    return (before - 2.0 * here + after).reshape(-1)
+
+
+def _inverse(depth_m: Float32[np.ndarray, 'h w']) -> Float32[np.ndarray, 'h w']:
+    with np.errstate(divide='ignore', invalid='ignore'):
+        return np.where(depth_m > 0, 1.0 / depth_m, np.float32(np.nan))

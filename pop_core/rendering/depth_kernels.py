@@ -36,14 +36,19 @@ def rasterize(vertices, faces, fx, fy, cx, cy, depth, face_id):
         right = min(w - 1, int(np.floor(max(u[a], u[b], u[c]))))
         top = max(0, int(np.ceil(min(v[a], v[b], v[c]))))
         bottom = min(h - 1, int(np.floor(max(v[a], v[b], v[c]))))
+        # Barycentric weights and inverse depth change by constants from pixel to pixel.
+        share = 1.0 / area
+        b_across, b_down = (v[c] - v[a]) * share, -(u[c] - u[a]) * share
+        c_across, c_down = -(v[b] - v[a]) * share, (u[b] - u[a]) * share
+        to_b, to_c = inverse[b] - inverse[a], inverse[c] - inverse[a]
         for y in range(top, bottom + 1):
+            b_row, c_row = b_down * (y - v[a]), c_down * (y - v[a])
             for x in range(left, right + 1):
-                wb = ((x - u[a]) * (v[c] - v[a]) - (u[c] - u[a]) * (y - v[a])) / area
-                wc = ((u[b] - u[a]) * (y - v[a]) - (x - u[a]) * (v[b] - v[a])) / area
-                wa = 1.0 - wb - wc
-                if wa < 0.0 or wb < 0.0 or wc < 0.0:
+                wb = b_row + b_across * (x - u[a])
+                wc = c_row + c_across * (x - u[a])
+                if wb < 0.0 or wc < 0.0 or wb + wc > 1.0:
                     continue
-                z = 1.0 / (wa * inverse[a] + wb * inverse[b] + wc * inverse[c])
+                z = 1.0 / (inverse[a] + wb * to_b + wc * to_c)
                 if z < depth[y, x]:
                     depth[y, x] = z
                     face_id[y, x] = t

@@ -71,21 +71,26 @@ def find_ground(frame: RgbdFrame, tries: int = 60) -> Ground | None:
         return None
     proposals = upward[:: max(1, len(upward) // tries)]
     normal, on_plane = normals[proposals], points[proposals]
-    height = points @ normal.T - np.einsum('pc,pc->p', normal, on_plane)
+    height = normal @ points.T - np.einsum('pc,pc->p', normal, on_plane)[:, None]
     # Depth noise grows with distance, and so does the width of a plane.
-    width = INLIER_M + 0.004 * points[:, 2:] ** 2
-    support = (np.abs(height) < width).mean(axis=0)
-    support[(height < -3 * width).mean(axis=0) > LOOSE_BELOW] = 0.0
+    width = INLIER_M + 0.004 * points[:, 2] ** 2
+    support = _shares(np.abs(height) < width)
+    support[_shares(height < -3 * width) > LOOSE_BELOW] = 0.0
     while support.max() >= MIN_SHARE:
         best = int(np.argmax(support))
-        ground = _settled(normal[best], on_plane[best], points, normals, width[:, 0])
-        below = np.mean(ground.height(points) < -width[:, 0])
+        ground = _settled(normal[best], on_plane[best], points, normals, width)
+        below = np.mean(ground.height(points) < -width)
         if below <= MAX_BELOW and _upward(ground.normal):
             return ground
         # A seat or a table with floor beside it: none of its points proposes a better plane.
-        support[np.abs(ground.height(on_plane)) < width[proposals, 0]] = 0.0
+        support[np.abs(ground.height(on_plane)) < width[proposals]] = 0.0
         support[best] = 0.0
     return None
+
+
+def _shares(mask: Bool[np.ndarray, 'p n']) -> Float[np.ndarray, 'p']:
+    """Return the share of each row that is true; counting is faster than a mean."""
+    return np.array([np.count_nonzero(row) for row in mask]) / mask.shape[1]
 
 
 def _upward(normal: Float[np.ndarray, '*n 3']) -> Bool[np.ndarray, '*n']:
