@@ -9,16 +9,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.qos import ReliabilityPolicy, qos_profile_sensor_data
+from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool, Trigger
 from support.node import ROOT, RunningNode
 from support.player import Player
 from support.recording import Recording, record
 from visualization_msgs.msg import Marker
 
+from pop_ros.diagnostics import read_values
 from pop_ros.frame_folder import load_frame
+from pop_ros.to_messages import make_header
 
 
 @pytest.fixture(scope='module')
@@ -132,6 +136,26 @@ def test_configuring_without_keypoints_fails_with_a_sentence_and_the_node_stays(
         assert state(player) == 'unconfigured'
         running.wait_for('not configured: keypoints: expected a folder')
     assert running.end() == 0
+
+
+def test_simulated_time_says_how_old_images_of_a_recording_are(
+    recording: Recording, start: Callable[..., RunningNode]
+) -> None:
+    running = start(*flags(recording), '--ros-args', '-p', 'use_sim_time:=true')
+    stamp = recording.stamps[0]
+    now = make_header(stamp + 250_000_000, '').stamp
+    values: dict[str, str] = {}
+    with Player(joints=PoseArray) as player:
+        player.node.create_subscription(
+            DiagnosticArray, '/diagnostics',
+            lambda message: values.update(read_values(message, '/pop') or {}), 10)
+        clock = player.node.create_publisher(Clock, '/clock', 10)
+        player.node.create_timer(0.05, lambda: clock.publish(Clock(clock=now)))
+        # Nothing depends on time that passes: this clock stands still.
+        fit_one(player, recording)
+        assert player.spin_until(lambda: values.get('frames') == '1'), running.output
+    assert values['age of the image when published'] == 'p50 250.0 ms, p95 250.0 ms'
+    assert running.end() == 0, running.output
 
 
 def test_services_act_on_what_is_shown_and_seen(
