@@ -142,6 +142,7 @@ def observe(
         noise: Noise of the measured depth.
     """
     window = person_window(lifted, frame.camera)
+    lifted = lifted.without_guesses()
     camera = window.camera(frame.camera)
     depth_m = window.cut(frame.depth_m)
     own = np.isfinite(depth_m) & ~window.cut(others) & ~window.cut(flying_pixels(frame.depth_m))

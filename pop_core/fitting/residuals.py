@@ -17,7 +17,7 @@ from pop_core.fitting.observation import KeypointRays
 from pop_core.fitting.robust_loss import Kernel
 from pop_core.keypoints.lifted_joints import LiftedJoints
 
-RAY_SCALE_M = 0.25  # a guessed pixel may be on another limb
+RAY_SCALE_M = 0.4  # a guessed pixel may be on another limb
 
 
 def joint_weight(

@@ -18,6 +18,7 @@ class LiftState(IntEnum):
     OCCLUDED = 1
     OUTLIER = 2
     MISSING = 3
+    GUESSED = 4  # by the detector: the position is that of what hides the joint, or of the joint
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,6 +56,15 @@ class LiftedJoints:
     def lifted(self) -> Bool[np.ndarray, 's']:
         """Return which joints have a position."""
         return np.isfinite(self.positions_camera).all(axis=1)
+
+    def without_guesses(self) -> LiftedJoints:
+        """Return the joints with guessed ones known by their pixel alone."""
+        guessed = self.state == LiftState.GUESSED
+        return LiftedJoints(
+            np.where(guessed[:, None], np.nan, self.positions_camera),
+            np.where(guessed, np.inf, self.sigma_m),
+            np.where(guessed, int(LiftState.OCCLUDED), self.state),
+            self.keypoints_px, self.scores)
 
     def with_sides_exchanged(self) -> LiftedJoints:
         """Return the joints with every left one called right, and the other way round."""

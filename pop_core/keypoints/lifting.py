@@ -19,6 +19,7 @@ from pop_core.keypoints.joint_depths import (
 from pop_core.keypoints.lifted_joints import LiftedJoints, LiftState
 from pop_core.keypoints.skeleton import BONE_M, TREE_PARENT
 from pop_core.keypoints.skeleton_checks import (
+    with_guessed_limbs,
     without_broken_bones,
     without_guessed_nose,
     without_hidden_limbs,
@@ -142,7 +143,8 @@ def _lift(
     state = without_broken_bones(position, view.scores, state, scale * config.stretch)
     state = without_hidden_limbs(position, view.scores, state, scale)
     state = without_guessed_nose(view.scores, state, facing_share)
-    visible = state == LiftState.VISIBLE
+    state = with_guessed_limbs(view.scores, state)
+    visible = np.isin(state, [LiftState.VISIBLE, LiftState.GUESSED])
     position = np.where(visible[:, None], position, np.nan)
     sigma_m = _sigma_m(view, joints.sigma_m[rows, chosen], at_joint, config)
     return position, np.where(visible, sigma_m, np.inf), state

@@ -13,6 +13,9 @@ SLACK_M = 0.12  # keypoint and depth errors of both ends
 SHORTEST = 0.4  # of a limb's bone, relative to the mean: shorter ones are noise at best
 ONE_PLACE_M = 0.06  # left and right limbs nearer than this are one limb seen twice
 GUESSED_NOSE_SCORE, FROM_BEHIND = 0.5, -0.3
+# Limbs far below what a detector usually says of this person are guesses: it does not see them.
+USUAL_PERCENTILE, GUESSED_SHARE = 75, 0.6
+FEWEST_SURE = 5
 
 
 def without_broken_bones(
@@ -74,6 +77,30 @@ def without_hidden_limbs(
             guessed = parent in LIMB_ENDS and scores[parent] < scores[j]
             state[parent if thigh or guessed else j] = LiftState.OCCLUDED
     return state
+
+
+def with_guessed_limbs(
+    scores: Float[np.ndarray, 's'], state: Int[np.ndarray, 's']
+) -> Int[np.ndarray, 's']:
+    """Return states in which limbs that a detector does not really see are called guessed.
+
+    What the camera sees at the pixel of a guess is mostly what hides the joint: the direction is
+    right, the depth is another's. Scores are compared with each other, since detectors differ in
+    what they call sure. Where too few joints remain, guesses count as seen.
+
+    Args:
+        scores: Confidence of each keypoint; 0 where there is none.
+        state: A LiftState per joint.
+    """
+    if not (scores > 0).any():
+        return state
+    usual = np.percentile(scores[scores > 0], USUAL_PERCENTILE)
+    guessed = np.zeros(len(scores), dtype=bool)
+    guessed[LIMB_ENDS] = scores[LIMB_ENDS] < GUESSED_SHARE * usual
+    guessed &= state == LiftState.VISIBLE
+    if (state == LiftState.VISIBLE).sum() - guessed.sum() < FEWEST_SURE:
+        return state
+    return np.where(guessed, int(LiftState.GUESSED), state)
 
 
 def without_guessed_nose(

@@ -48,6 +48,7 @@ def observe_track(
         return Observation(
             window, camera, depth_m, rays, own, None, seen_joints(predicted, joint_state),
             _no_rays(), ground, noise)
+    lifted = lifted.without_guesses()
     return Observation(
         window, camera, depth_m, rays, own, None, lifted, keypoint_rays(lifted, frame.camera),
         ground, noise)

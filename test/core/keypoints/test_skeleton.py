@@ -8,6 +8,7 @@ from pop_core.body.model import rest_parameters, shared_points
 from pop_core.keypoints.lifted_joints import LiftState
 from pop_core.keypoints.skeleton import BONE_M, ORDER, PATH_M, TREE_PARENT, linked
 from pop_core.keypoints.skeleton_checks import (
+    with_guessed_limbs,
     without_broken_bones,
     without_guessed_nose,
     without_hidden_limbs,
@@ -111,6 +112,25 @@ def test_a_thigh_without_length_hides_the_hip_behind_the_knee():
     points[ROW['left_ankle']] = points[ROW['left_knee']] + [0.0, -0.4, 0.0]
     state = without_hidden_limbs(points, np.full(15, 0.9), visible(), 1.0)
     assert np.flatnonzero(state == LiftState.OCCLUDED).tolist() == [ROW['left_hip']]
+
+
+@pytest.mark.parametrize('sure', [0.9, 0.3])
+def test_limbs_of_low_score_are_guessed_whatever_scores_are_usual(sure):
+    scores = np.full(15, sure)
+    guessed = [ROW['left_elbow'], ROW['left_wrist']]
+    scores[guessed] = 0.4 * sure
+    scores[ROW['pelvis']] = 0.4 * sure  # a trunk is where its surface is
+    state = with_guessed_limbs(scores, visible())
+    assert np.flatnonzero(state == LiftState.GUESSED).tolist() == guessed
+
+
+def test_guesses_count_as_seen_where_little_else_was():
+    state = np.full(15, int(LiftState.MISSING))
+    state[[ROW[name] for name in ('neck', 'left_shoulder', 'right_shoulder', 'left_elbow')]] = 0
+    scores = np.where(state == LiftState.VISIBLE, 0.9, 0.0)
+    scores[ROW['left_elbow']] = 0.2
+    assert np.array_equal(with_guessed_limbs(scores, state), state)
+    assert np.array_equal(with_guessed_limbs(np.zeros(15), state), state)
 
 
 def test_a_doubtful_nose_of_a_person_turned_away_is_hidden():
