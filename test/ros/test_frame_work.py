@@ -1,15 +1,19 @@
 """A fault of the node itself is counted, told and survived."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 import rclpy
 from rclpy.lifecycle import LifecycleNode
 from support.camera_cases import PLAIN, build
+from support.messages import camera_info, depth_image, image
 from support.player import Listener
+from support.recording import record
 
 from pop_core.config import PipelineConfig
 from pop_core.keypoints.detection import Detection
+from pop_core.keypoints.openpose_json import OpenPoseJsonDetector
 from pop_core.rgbd import RgbdFrame
 from pop_ros.frame_work import FrameWork
 from pop_ros.inputs import RgbdMessages
@@ -31,6 +35,18 @@ class Faulty:
         if self.calls % 2:
             raise ZeroDivisionError('division by zero')
         return []
+
+
+class Counted(OpenPoseJsonDetector):
+    """A keypoint source that knows which frames it was asked for."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder)
+        self.asked: list[int] = []
+
+    def detect(self, frame: RgbdFrame) -> list[Detection]:
+        self.asked.append(frame.stamp_ns)
+        return super().detect(frame)
 
 
 @pytest.fixture
@@ -64,3 +80,27 @@ def test_frames_after_a_fault_are_fitted_and_the_fault_is_counted(
     # Said once, not with every frame.
     assert capfd.readouterr().err.count('frame failed (zero division)') == 1
     assert work.failure is None
+
+
+def test_frames_that_nobody_had_time_for_do_not_make_a_camera_slow(
+    node: LifecycleNode, tmp_path: Path
+) -> None:
+    recording = record(tmp_path, n_frames=6, rate_hz=15.0)
+    statistics, detector = NodeStatistics(), Counted(recording.keypoints)
+    settings = ConfigParameters(node, NodeConfig(lazy=False), PipelineConfig(), lambda: None)
+    work = FrameWork(
+        node, settings, detector, StaticFrames(), NodeOutputs(node), statistics)
+    with Listener() as clock:
+        assert clock.spin_until(lambda: work.is_ready, 120)
+        work.run(True)
+        # In every second frame people are looked for, until they are known for sure.
+        for number in (1, 2, 3, 6):
+            frame, stamp = recording.scenes[number - 1].frame, recording.stamps[number - 1]
+            work.put(RgbdMessages(
+                image(frame.rgb, 'rgb8', stamp), depth_image(frame.depth_m, '16UC1', stamp),
+                camera_info(frame.camera, stamp), 0.0, number=number))
+            assert clock.spin_until(lambda: statistics.snapshot().pending == 0, 20)
+    assert work.stop(10)
+    assert statistics.snapshot().frames == 4
+    # The sixth lies 0.2 s behind the third, as from a camera of 5 Hz, all of whose frames count.
+    assert detector.asked == [recording.stamps[0], recording.stamps[2]]

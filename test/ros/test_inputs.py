@@ -113,6 +113,7 @@ def test_a_recording_that_loops_gives_every_pair_every_time(receiver: Receiver) 
     receive(receiver, plan, 21)
     expected = [START_NS + k * STEP_NS for k in range(7)] * 3
     assert sorted(receiver.stamps()) == sorted(expected)
+    assert [frame.number for frame in receiver.frames] == list(range(1, 22))
     assert receiver.inputs.pairer.color_stream.jumps_back == 2
 
 
