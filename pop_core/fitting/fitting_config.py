@@ -35,5 +35,7 @@ class FittingConfig:
     other_readings: bool = setting(
         True,
         about='Whether bodies are tried turned about, legs exchanged, limbs rolled back, too.')
+    seat_contact: bool = setting(
+        False, about='Whether people who sit or lie rest on the seat measured beside them.')
     free_space: bool = setting(
         True, about='Whether bodies are pushed out of space the sensor saw through.')

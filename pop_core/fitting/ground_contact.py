@@ -42,9 +42,9 @@ def ground_pairs(
     below = np.flatnonzero(height < -TOLERANCE_M)
     # Meshes of any density push alike.
     weight = np.full(len(below), 100.0 / len(height) / BELOW_SIGMA_M**2)
-    parts = [_on_floor(state, below, height, ground, weight)]
+    parts = [onto_plane(state, below, ground, weight)]
     contact = [height[sole].mean() for sole in state.body.soles]
-    upright = np.clip(2.0 * _uprightness(state, ground) - 0.5, 0.0, 1.0)
+    upright = np.clip(2.0 * uprightness(state, ground) - 0.5, 0.0, 1.0)
     for ankle, sole, foot_height in zip(ANKLES, state.body.soles, contact, strict=True):
         if lifted.lifted[ankle]:
             continue
@@ -52,22 +52,23 @@ def ground_pairs(
         carries = 1.0 if foot_height <= min(contact) else 0.3
         worth = 4.0 * upright * carries / CONTACT_SIGMA_M**2 / len(sole)
         weight = worth * kernel(height[sole], CONTACT_SCALE_M)
-        parts.append(_on_floor(state, sole, height, ground, weight))
+        parts.append(onto_plane(state, sole, ground, weight))
     return join_pairs(parts)
 
 
-def _uprightness(state: BodyState, ground: Ground) -> float:
+def uprightness(state: BodyState, ground: Ground) -> float:
     """Return the cosine between the trunk and the floor's normal: people who lie do not stand."""
     trunk = state.joints[JOINT_INDEX['neck']] - state.joints[JOINT_INDEX['pelvis']]
     return float(trunk @ ground.normal / np.linalg.norm(trunk))
 
 
-def _on_floor(
+def onto_plane(
     state: BodyState,
     vertex: Int[np.ndarray, 'n'],
-    height: Float[np.ndarray, 'v'],
-    ground: Ground,
+    plane: Ground,
     weight: Float[np.ndarray, 'n'],
 ) -> Pairs:
-    target = state.vertices[vertex] - height[vertex, None] * ground.normal
-    return Pairs(vertex, np.tile(ground.normal, (len(vertex), 1)), target, weight)
+    """Return pairs that draw vertices onto a plane, along its normal."""
+    points = state.vertices[vertex]
+    target = points - plane.height(points)[:, None] * plane.normal
+    return Pairs(vertex, np.tile(plane.normal, (len(vertex), 1)), target, weight)

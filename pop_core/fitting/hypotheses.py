@@ -34,6 +34,7 @@ from pop_core.fitting.levenberg_marquardt import FIRST_DAMPING, cost_of, levenbe
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import Pairs, join_pairs
 from pop_core.fitting.robust_loss import geman_mcclure_share
+from pop_core.fitting.seat_contact import find_seat, seat_pairs
 from pop_core.rendering.depth_renderer import RenderedDepth
 from pop_core.segmentation.body_segmentation import SegmentationConfig, segment_body
 
@@ -98,6 +99,9 @@ class HypothesisSteps:
                 hypothesis.state, observation, visibility, segment, scale_m)]
             if free_space and self.config.free_space:
                 pairs.append(self._free_space(hypothesis.state, observation, visibility, segment))
+            if self.config.seat_contact:
+                seat = find_seat(hypothesis.state, observation, segment)
+                pairs += [] if seat is None else [seat_pairs(hypothesis.state, seat)]
             # Keypoints stay as a stability penalty (Eq. 2).
             weights = self.weights(joints=min(1.0, scale_m / TRUSTED_M))
             active = self._active(pose=True, betas=free_space or k >= 2)
