@@ -33,6 +33,10 @@ class Residual:
     J: Float[np.ndarray, 'n x'] | None
     w: Float[np.ndarray, 'n']
 
+    def first(self, n: int) -> Residual:
+        """Return the first n residuals."""
+        return Residual(self.r[:n], None if self.J is None else self.J[:n], self.w[:n])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NormalEquations:

@@ -66,9 +66,19 @@ def first_state(parameters: BodyParameters, hessian: Float[np.ndarray, 'x x']) -
         np.diag(SPEED**2))
 
 
-def predict(state: FilterState, model: BodyModel, dt_s: float) -> FilterState:
-    """Return the belief a time step [s] later, nothing having been seen."""
-    noise = motion_noise(dt_s)
+def predict(
+    state: FilterState, model: BodyModel, dt_s: float,
+    liveliness: Float[np.ndarray, '75'] | float = 1.0,
+) -> FilterState:
+    """Return the belief a time step later, nothing having been seen.
+
+    Args:
+        state: The belief.
+        model: The body it is of.
+        dt_s: Time step [s].
+        liveliness: Share of the usual velocity noise of each coordinate.
+    """
+    noise = motion_noise(dt_s, liveliness)
     step = np.zeros(len(state.covariance))
     step[MOVING] = noise.reach_s * state.velocity
     parameters = increment(state.parameters, step, pose_skeleton(model, state.parameters))

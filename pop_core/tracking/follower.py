@@ -26,7 +26,10 @@ from pop_core.tracking.body_filter import (
 )
 from pop_core.tracking.fresh_fits import FreshFit
 from pop_core.tracking.late_belief import caught_up, moved_on
+from pop_core.tracking.limb_claims import limbs_of
+from pop_core.tracking.limb_search import LimbSearch
 from pop_core.tracking.limbs import contradicted_joints, limb_bones, loosened
+from pop_core.tracking.liveliness import followed_trail, liveliness
 from pop_core.tracking.motion import N_MOVING
 from pop_core.tracking.rivals import costs, follow_alternatives
 from pop_core.tracking.track import Alternative, PersonTrack
@@ -54,12 +57,17 @@ class Follower:
         """Use a pipeline's model, fitter and settings."""
         self.pipeline, self.config = pipeline, config
         self.warm = WarmStart(pipeline.fitter)
+        self.limb_search = LimbSearch(pipeline.fitter.prior)
 
     def predict(self, track: PersonTrack, now_ns: int) -> None:
         """Move a track's beliefs to the time of a frame."""
         track.gap_s = (now_ns - track.now_ns) * 1e-9
         track.now_ns = now_ns
-        track.filter = predict(track.filter, self.pipeline.model, track.gap_s)
+        joints = self._body(track.filter).joints
+        track.trail = followed_trail(
+            joints if track.trail is None else track.trail, joints, track.gap_s)
+        lively = liveliness(joints, track.trail, track.joint_state)
+        track.filter = predict(track.filter, self.pipeline.model, track.gap_s, lively)
         for other in track.alternatives:
             other.filter = predict(other.filter, self.pipeline.model, track.gap_s)
 
@@ -168,12 +176,17 @@ class Follower:
         loose = limb_bones(contradicted)
         if not loose.any():
             return fit
-        free = loosened(track.filter, loose)
+        free = replace(
+            loosened(track.filter, loose),
+            parameters=self.limb_search.find(fit.state, observation, loose))
         other = self.warm.fit(
             free, observation, self.config.steps, detected=True, loose=loose)
         ours, theirs = costs(self.warm.fitter, [fit, other], observation)
         resolved = int(contradicted.sum() - contradicted_joints(other.state, lifted).sum())
-        if theirs >= ours + RESOLVED * resolved:
+        # A keypoint may itself be wrong: a limb is where measured points are its own.
+        limbs = limbs_of(loose)
+        is_seen = other.of_limb[limbs].sum() > fit.of_limb[limbs].sum()
+        if theirs >= ours + RESOLVED * resolved or not is_seen:
             return fit
         track.filter = free
         return other

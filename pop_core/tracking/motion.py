@@ -64,11 +64,18 @@ def _of_coordinates() -> tuple[Float[np.ndarray, '75'], Float[np.ndarray, '75']]
 SPEED, LASTING_S = _of_coordinates()
 
 
-def motion_noise(dt_s: float) -> MotionNoise:
-    """Return the exact discretisation of the process over a time step [s]."""
+def motion_noise(
+    dt_s: float, liveliness: Float[np.ndarray, '75'] | float = 1.0
+) -> MotionNoise:
+    """Return the exact discretisation of the process over a time step [s].
+
+    Args:
+        dt_s: Time step.
+        liveliness: Share of the usual standard deviation of each velocity.
+    """
     decay = np.exp(-dt_s / LASTING_S)
     lost = 1.0 - decay
-    density = 2.0 * SPEED**2 / LASTING_S
+    density = 2.0 * (liveliness * SPEED) ** 2 / LASTING_S
     squared = LASTING_S * (1.0 - decay**2) / 2.0
     return MotionNoise(
         reach_s=LASTING_S * lost,

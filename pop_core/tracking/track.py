@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 
 from pop_core.body.joints import N_JOINTS
 from pop_core.body.model import BodyParameters
@@ -50,6 +50,7 @@ class PersonTrack:
         doubts: Detections, one after the other, after which something was still wrong.
         is_doubtful: Whether something was wrong in the last frame.
         restarted_ns: When the body was last looked for anew.
+        trail: Where the joints were of late, None before the second frame [m].
         depth_level: E_depth that is usual for this person [m].
         alternatives: Other explanations.
         shown: Parameters given out last.
@@ -71,6 +72,7 @@ class PersonTrack:
     doubts: int = 0
     is_doubtful: bool = False
     restarted_ns: int = 0
+    trail: Float[np.ndarray, '24 3'] | None = None
     depth_level: float | None = None
     alternatives: list[Alternative] = field(default_factory=list)
     shown: BodyParameters | None = None

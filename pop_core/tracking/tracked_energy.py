@@ -20,11 +20,11 @@ from pop_core.fitting.energy import (
 from pop_core.fitting.levenberg_marquardt import Residual, assemble
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.priors import limit_prior_residual, pose_prior_residual
-from pop_core.fitting.residuals import Pairs
 from pop_core.fitting.robust_loss import geman_mcclure_weight
 from pop_core.geometry.rotation import left_jacobian_inverse
 from pop_core.retrieval.pose_prior import PosePrior
 from pop_core.tracking.body_filter import FilterState, difference, inverse
+from pop_core.tracking.measured_surface import SurfaceTerms
 from pop_core.tracking.motion import N_MOVING
 
 SURE_SIGMAS = 2.0  # a joint may be found this far from its prediction, and be the joint
@@ -73,14 +73,14 @@ class TrackedEnergy:
 
     def __init__(
         self, state: BodyState, observation: Observation, prior: PosePrior,
-        weights: TermWeights, pairs: Pairs, prediction: Prediction,
+        weights: TermWeights, surface: SurfaceTerms, prediction: Prediction,
     ) -> None:
         """Freeze robust weights at `state`."""
         # The predicted body takes the place of the retrieved pose.
         belief = PriorBelief(prior, state.parameters.body_pose, np.ones(23))
-        self._energy = BodyEnergy(state, observation, belief, weights, pairs)
+        self._energy = BodyEnergy(state, observation, belief, weights, surface.pairs)
         self._energy.joint_weight = _joint_weight(state, observation, weights, prediction)
-        self._prediction = prediction
+        self._prediction, self._n_measured = prediction, surface.n_measured
 
     def residuals(self, state: BodyState, jacobian: bool) -> list[Residual]:
         """Return every block of residuals at a state."""
@@ -92,8 +92,9 @@ class TrackedEnergy:
         """Return what bends the energy at a state, and the blocks it was made of."""
         blocks = self._energy.residuals(state, True)
         size = state.body.size
+        measured = [block.first(self._n_measured) for block in blocks[PAIR_BLOCKS]]
         return Curvature(
-            assemble([*blocks[JOINT_BLOCKS], *blocks[PAIR_BLOCKS]], size).hessian,
+            assemble([*blocks[JOINT_BLOCKS], *measured], size).hessian,
             assemble(blocks[PRIOR_BLOCKS], size).hessian), blocks
 
 

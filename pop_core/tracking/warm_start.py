@@ -10,25 +10,23 @@ from jaxtyping import Bool, Float
 from pop_core.body.model import BodyParameters
 from pop_core.fitting.body_fit import BodyFit, BodyFitter
 from pop_core.fitting.body_state import BodyState
-from pop_core.fitting.correspondence import match_points, match_vertices, thin_points
 from pop_core.fitting.depth_consistency import (
     HidingPlaces,
     Sight,
     Visibility,
     depth_energy,
-    free_space_pairs,
     see_body,
 )
 from pop_core.fitting.energy import PAIR_BLOCKS, PRIOR_BLOCKS, TermWeights
-from pop_core.fitting.ground_contact import ground_pairs
 from pop_core.fitting.levenberg_marquardt import (
     FIRST_DAMPING,
     cost_of,
     levenberg_marquardt_step,
 )
 from pop_core.fitting.observation import Observation
-from pop_core.fitting.residuals import Pairs, join_pairs
 from pop_core.tracking.body_filter import FilterState, update
+from pop_core.tracking.limb_claims import LimbClaims
+from pop_core.tracking.measured_surface import surface_terms
 from pop_core.tracking.tracked_energy import Curvature, Prediction, TrackedEnergy
 
 # The robust kernel from the first to the last step [m]: a prediction is off by little, unless
@@ -72,6 +70,7 @@ class WarmFit:
         segment: Pixels of the observation that show the person.
         curvature: J'WJ of measurements and priors.
         energies: Final energies by name.
+        of_limb: Weight of the measured points that each of `limb_claims.LIMBS` claims.
     """
 
     state: BodyState
@@ -79,6 +78,7 @@ class WarmFit:
     segment: Bool[np.ndarray, 'h w']
     curvature: Curvature
     energies: dict[str, float]
+    of_limb: Float[np.ndarray, '4']
 
     def as_body_fit(
         self, hessian: Float[np.ndarray, 'x x'], runners_up: tuple[BodyParameters, ...]
@@ -131,11 +131,14 @@ class WarmStart:
         segment = self.fitter.steps.segment(visibility.rendered, observation)
         places = HidingPlaces(observation, segment, state.vertices[:, 2])
         for k, scale_m in enumerate(scales_m):
-            pairs = self._pairs(state, observation, visibility, segment, places, float(scale_m))
+            claims = LimbClaims(state, observation, prediction.landmark_sigma_m)
+            surface = surface_terms(
+                state, observation, visibility, segment, places=places, claims=claims,
+                scale_m=float(scale_m), config=self.fitter.config)
             if loose is not None and k < EXTRA_STEPS:
-                pairs = _without(pairs, loose[state.body.main_bone[pairs.vertex]])
+                surface = surface.without(loose, state)
             energy = TrackedEnergy(
-                state, observation, self.fitter.prior, weights, pairs, prediction)
+                state, observation, self.fitter.prior, weights, surface, prediction)
             report = levenberg_marquardt_step(
                 state, energy.residuals, BodyState.moved, active, damping)
             state, damping = report.state, report.damping
@@ -147,30 +150,7 @@ class WarmStart:
             'E_NN': cost_of(blocks[PAIR_BLOCKS]),
             'E_depth': depth_energy(visibility.rendered, observation, segment),
         }
-        return WarmFit(state, visibility, segment, curvature, energies)
-
-    def _pairs(
-        self, state: BodyState, observation: Observation, visibility: Visibility,
-        segment: Bool[np.ndarray, 'h w'], places: HidingPlaces, scale_m: float,
-    ) -> Pairs:
-        points, labels = thin_points(observation, segment, self.fitter.config.surface_points)
-        # Planes only: a point tied to its nearest vertex holds a body that slides where it is,
-        # and the filter would take that for knowledge.
-        parts = [
-            match_points(
-                state, visibility, points, labels, scale_m, observation.noise),
-            match_vertices(state, visibility, scale_m, observation.noise)]
-        if self.fitter.config.free_space:
-            parts.append(free_space_pairs(state, visibility, places))
-        if observation.ground is not None:
-            parts.append(ground_pairs(state, observation.ground, observation.lifted))
-        return join_pairs(parts)
-
-
-def _without(pairs: Pairs, left_out: Bool[np.ndarray, 'n']) -> Pairs:
-    keep = ~left_out
-    return Pairs(
-        pairs.vertex[keep], pairs.direction[keep], pairs.target[keep], pairs.weight[keep])
+        return WarmFit(state, visibility, segment, curvature, energies, surface.of_limb)
 
 
 def farthest_joint_m(state: BodyState, observation: Observation) -> float:

@@ -1,0 +1,103 @@
+"""Which measured points a limb may claim: none that surer parts of the body explain as well.
+
+An arm that swings behind the trunk lies near the trunk's surface, and would be found there, ever
+surer of its place. A point says as much of a limb as it would be amiss were the limb not there:
+it is compared with the depth image of everything surer. The trunk is surest; limbs follow by the
+doubt of their prediction. An arm left with few points is hidden, and claims none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import cv2
+import numpy as np
+from jaxtyping import Bool, Float, Float32, Int
+
+from pop_core.body.joints import JOINT_INDEX, JOINT_NAMES, SHARED_INDEX
+from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.observation import Observation
+from pop_core.fitting.residuals import Pairs
+from pop_core.rendering.depth_renderer import render_depth
+
+SIDES = ('left', 'right')
+ARM, LEG = ('shoulder', 'elbow', 'wrist', 'hand'), ('hip', 'knee', 'ankle', 'foot')
+LIMBS = tuple(
+    tuple(JOINT_INDEX[f'{side}_{part}'] for part in parts)
+    for parts in (ARM, LEG) for side in SIDES)
+ARM_LIMBS = (0, 1)
+ENDS = np.array([SHARED_INDEX[JOINT_NAMES[limb[2]]] for limb in LIMBS])  # wrists and ankles
+TRUNK_SIGMA_M = 0.02  # cloth, and the place of what is surer
+RIM_PX = 5  # cloth and hair make a body wider than its model
+HIDDEN_SHARE, FEWEST_POINTS = 0.5, 20.0
+
+
+def _limb_of_bone() -> Int[np.ndarray, '24']:
+    out = np.full(len(JOINT_NAMES), -1)
+    for number, limb in enumerate(LIMBS):
+        out[list(limb)] = number
+    return out
+
+
+LIMB_OF_BONE = _limb_of_bone()
+
+
+def limbs_of(bones: Bool[np.ndarray, '24']) -> Int[np.ndarray, 'n']:
+    """Return the limbs that some joints belong to."""
+    limbs = np.unique(LIMB_OF_BONE[bones])
+    return limbs[limbs >= 0]
+
+
+class LimbClaims:
+    """What is surer than each limb of a body, as the camera would see it alone."""
+
+    def __init__(
+        self, state: BodyState, observation: Observation, doubt_m: Float[np.ndarray, 's']
+    ) -> None:
+        """Render a body part by part.
+
+        Args:
+            state: Body.
+            observation: What the sensor says.
+            doubt_m: Standard deviation of each shared joint's predicted place.
+        """
+        self.observation = observation
+        self.limb_of_vertex = LIMB_OF_BONE[state.body.main_bone]
+        of_face = self.limb_of_vertex[state.body.faces].max(axis=1)
+        order = [-1, *np.argsort(doubt_m[ENDS], kind='stable').tolist()]
+        surer = np.full(observation.depth_m.shape, np.inf, dtype=np.float32)
+        self._surer_m: dict[int, Float32[np.ndarray, 'h w']] = {}
+        for part, following in pairwise(order):
+            own = render_depth(
+                state.vertices, state.body.faces[of_face == part], observation.camera)
+            surer = np.minimum(surer, own.depth_m)
+            self._surer_m[following] = cv2.erode(surer, np.ones((RIM_PX, RIM_PX), np.uint8))
+
+    def weighed(self, pairs: Pairs) -> tuple[Pairs, Float[np.ndarray, '4']]:
+        """Return pairs by what they say of limbs, and the weight that is left to each limb.
+
+        Args:
+            pairs: Vertices and measured points.
+        """
+        limb_of_pair = self.limb_of_vertex[pairs.vertex]
+        weight = pairs.weight.copy()
+        of_limb = np.zeros(len(LIMBS))
+        for limb, surer_m in self._surer_m.items():
+            rows = np.flatnonzero(limb_of_pair == limb)
+            share = self._share(pairs.target[rows], surer_m)
+            left = weight[rows] * share
+            few = share.sum() < FEWEST_POINTS or left.sum() < HIDDEN_SHARE * weight[rows].sum()
+            weight[rows] = 0.0 if few and limb in ARM_LIMBS else left
+            of_limb[limb] = weight[rows].sum()
+        return replace(pairs, weight=weight), of_limb
+
+    def _share(
+        self, points: Float[np.ndarray, 'n 3'], surer_m: Float32[np.ndarray, 'h w']
+    ) -> Float[np.ndarray, 'n']:
+        """Return how little each point is explained by what is surer than the limb, 0..1."""
+        camera = self.observation.camera
+        last = np.array([camera.width, camera.height]) - 1
+        u, v = np.clip(np.rint(camera.project(points)), 0, last).astype(np.int64).T
+        sigma_m = np.hypot(TRUNK_SIGMA_M, self.observation.noise.sigma_m(points[:, 2]))
+        return np.asarray(1.0 - np.exp(-0.5 * ((surer_m[v, u] - points[:, 2]) / sigma_m) ** 2))
