@@ -23,7 +23,6 @@ class WatchedNode:
                    '--keypoints-dir', str(keypoints), '--ros-args', *ros_arguments]
         self.started_s = time.monotonic()
         self._process = subprocess.Popen(command)
-        self._files = Path('/proc') / str(self._process.pid)
 
     def check(self) -> None:
         """Raise if it has ended."""
@@ -32,14 +31,24 @@ class WatchedNode:
 
     @property
     def memory_mb(self) -> float:
-        """Return the resident memory [MB]."""
-        return int((self._files / 'statm').read_text().split()[1]) * PAGE / 1e6
+        """Return the resident memory of the node and of the process that it starts [MB]."""
+        return sum(
+            int((files / 'statm').read_text().split()[1]) * PAGE / 1e6 for files in self._files())
 
     @property
     def cpu_s(self) -> float:
-        """Return the processor time used so far [s]."""
-        fields = (self._files / 'stat').read_text().rsplit(')', 1)[1].split()
-        return (int(fields[11]) + int(fields[12])) / TICKS
+        """Return the processor time that both have used so far [s]."""
+        used = 0
+        for files in self._files():
+            fields = (files / 'stat').read_text().rsplit(')', 1)[1].split()
+            used += int(fields[11]) + int(fields[12])
+        return used / TICKS
+
+    def _files(self) -> list[Path]:
+        node = Path('/proc') / str(self._process.pid)
+        # Any of the node's threads may have started the other process.
+        started = [(task / 'children').read_text().split() for task in node.glob('task/*')]
+        return [node, *(node.parent / pid for pids in started for pid in pids)]
 
     def stop(self) -> tuple[int, float]:
         """End it as Ctrl-C does; return its exit code and how long that took [s]."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +12,7 @@ from pop_core.estimate import FrameResult
 from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.pipeline import BodyPipeline
 from pop_core.rgbd import RgbdFrame
+from pop_core.tracking.fresh_fits import BackgroundFinder
 from pop_core.tracking.tracker import BodyTracker
 from pop_ros.body_messages import RECORDED_TYPES, BodyMessages, Output
 from pop_ros.frame_maker import FrameMaker
@@ -47,7 +47,7 @@ class FrameFitter:
         config: NodeConfig,
         progress: Callable[[float, str], None] | None = None,
         frames: StaticFrames | None = None,
-        executor: Executor | None = None,
+        background: BackgroundFinder | None = None,
     ) -> None:
         """Load body model and pose library, and compile kernels.
 
@@ -57,14 +57,14 @@ class FrameFitter:
             config: Settings of messages and of the tracker.
             progress: Told a share 0..1 and a sentence while a first library is generated.
             frames: Knows where a depth camera with a frame of its own stands.
-            executor: Finds people anew while others are followed; None lets frames wait for it.
+            background: Finds people anew while others are followed; None lets frames wait.
 
         Raises:
             PopError: If one of them cannot be loaded.
         """
         apply_settings(detector, pipeline_config)
         self._pipeline = make_pipeline(detector, pipeline_config, progress=progress)
-        self._tracker = BodyTracker(self._pipeline, config.tracking, executor)
+        self._tracker = BodyTracker(self._pipeline, config.tracking, background)
         self._messages = BodyMessages(self._pipeline.model, config)
         self._maker = FrameMaker(frames or StaticFrames())
         self._maker.extrinsics = parse_extrinsics(config.depth.extrinsics)

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.task import Future
-from threadpoolctl import ThreadpoolController
 
 from pop_core.config import PipelineConfig
 from pop_core.errors import PopError
 from pop_core.keypoints.detection import KeypointDetector
+from pop_ros.finding_process import FindingProcess
 from pop_ros.frame_fitter import FittedFrame, FrameFitter
 from pop_ros.from_messages import stamp_ns
 from pop_ros.inputs import RgbdMessages
@@ -54,7 +53,7 @@ class FrameWork:
         self._latest: FittedFrame | None = None
         self._last_number = 0
         self._said_share = -1.0
-        self._finding = ThreadPoolExecutor(1, 'pop finding people')
+        self._finding = FindingProcess()
         self._worker: Worker[RgbdMessages] = Worker(
             self._fit, self._on_error, lambda: self._prepare(detector, frames))
         self._worker.start()
@@ -105,15 +104,13 @@ class FrameWork:
         if self._worker.mailbox.clear():
             self._statistics.add_drop(STOPPED)
         finished = self._worker.stop(timeout_s)
-        self._finding.shutdown(wait=False, cancel_futures=True)
+        self._finding.stop()
         return finished
 
     # Worker thread
 
     def _prepare(self, detector: KeypointDetector, frames: StaticFrames) -> None:
         started_s = time.monotonic()
-        # Two threads fit: the limit that one takes back must not surprise the other.
-        ThreadpoolController().limit(limits=1, user_api='blas')
         self._log.info(
             'preparing; the first start generates the pose library and compiles kernels, later '
             'ones read them from the cache')
@@ -121,6 +118,7 @@ class FrameWork:
             detector, self._settings.pipeline_config, self._settings.node_config,
             self._say_progress, frames, self._finding)
         self._outputs.publish_model(fitter.model)
+        self._configure_finding()
         self._fitter = fitter
         self.doing = ''
         self._log.info(f'ready after {time.monotonic() - started_s:.1f} s')
@@ -155,6 +153,12 @@ class FrameWork:
     def _configure(self) -> None:
         if self._fitter is not None:
             self._fitter.configure(self._settings.pipeline_config, self._settings.node_config)
+            self._configure_finding()
+
+    def _configure_finding(self) -> None:
+        self._finding.configure(self._settings.pipeline_config)
+        if self._settings.node_config.tracking.enabled:
+            self._finding.start()
 
     def _reset(self) -> None:
         if self._fitter is not None:

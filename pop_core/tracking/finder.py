@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from pop_core.estimate import EstimateStatus
+import numpy as np
+from jaxtyping import Float
+
+from pop_core.body.model import BodyParameters
+from pop_core.estimate import BodyEstimate, EstimateStatus
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.keypoints.lifting import lift_keypoints
 from pop_core.pipeline import (
     BodyPipeline,
-    PersonFit,
     Scene,
     covers_keypoints,
     nearest_first,
@@ -59,12 +62,48 @@ class Finder:
         return lift_keypoints(
             without_depth(scene.frame, scene.taken), detection, self.pipeline.config.lifting)
 
-    def fit(self, scene: Scene, found: Found, index: int) -> PersonFit:
-        """Return a person fitted from retrieved poses, as if the frame stood alone."""
-        detection = found.detections[index]
-        # A pose is retrieved for joints that agree with each other.
-        lifted = self.pipeline.lift(scene.frame, detection)
-        status = self.pipeline.admit(lifted)
-        if status is not EstimateStatus.OK:
-            return PersonFit(status)
-        return self.pipeline.fit_person(scene, detection, lifted, Stopwatch())
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundBody:
+    """A body fitted from retrieved poses, as far as a tracker needs it.
+
+    Args:
+        parameters: The fit.
+        hessian: J'WJ of the fit.
+        runners_up: Other explanations.
+    """
+
+    parameters: BodyParameters
+    hessian: Float[np.ndarray, 'x x']
+    runners_up: tuple[BodyParameters, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundPerson:
+    """What became of a detection that was fitted as if its frame stood alone.
+
+    Args:
+        status: Why there is no body, or that there is one.
+        estimate: The person as users get them.
+        body: The same as the tracker goes on with it.
+    """
+
+    status: EstimateStatus
+    estimate: BodyEstimate | None = None
+    body: FoundBody | None = None
+
+
+def find_person(pipeline: BodyPipeline, scene: Scene, detection: Detection) -> FoundPerson:
+    """Return a person fitted from retrieved poses, as if the frame stood alone."""
+    # A pose is retrieved for joints that agree with each other.
+    lifted = pipeline.lift(scene.frame, detection)
+    status = pipeline.admit(lifted)
+    if status is not EstimateStatus.OK:
+        return FoundPerson(status)
+    person = pipeline.fit_person(scene, detection, lifted, Stopwatch())
+    if person.fit is None:
+        return FoundPerson(person.status, person.estimate)
+    fit = person.fit
+    return FoundPerson(
+        person.status, person.estimate,
+        FoundBody(fit.parameters, fit.hessian, fit.runners_up))

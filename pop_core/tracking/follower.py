@@ -14,7 +14,7 @@ from pop_core.fitting.observation import Observation
 from pop_core.fitting.plausibility import plausibility
 from pop_core.fitting.uncertainty import joint_covariance
 from pop_core.keypoints.lifted_joints import LiftedJoints
-from pop_core.pipeline import BodyPipeline, PersonFit, Scene
+from pop_core.pipeline import BodyPipeline, Scene
 from pop_core.tracking.association import Expected
 from pop_core.tracking.body_filter import (
     FilterState,
@@ -24,6 +24,7 @@ from pop_core.tracking.body_filter import (
     predict,
     with_known_shape,
 )
+from pop_core.tracking.finder import FoundBody
 from pop_core.tracking.fresh_fits import FreshFit
 from pop_core.tracking.late_belief import caught_up, moved_on
 from pop_core.tracking.limb_claims import limbs_of
@@ -108,7 +109,8 @@ class Follower:
     ) -> None:
         """Take over a fit that began with retrieved poses; the shape stays the person's."""
         track.filter = self._found_anew(track, fresh, lifted)
-        self.begin(track, fresh.person)
+        assert fresh.person.body is not None
+        self.begin(track, fresh.person.body)
         late_s = (track.now_ns - fresh.stamp_ns) * 1e-9
         for other in track.alternatives:
             other.filter = moved_on(other.filter, self.pipeline.fitter.coarse, late_s, lifted)
@@ -121,14 +123,13 @@ class Follower:
         for other in track.alternatives:
             other.filter = caught_up(other.filter, body, track.gap_s, lifted)
 
-    def begin(self, track: PersonTrack, person: PersonFit) -> None:
+    def begin(self, track: PersonTrack, found: FoundBody) -> None:
         """Keep the other explanations of a fresh fit while they may be true."""
-        assert person.fit is not None
         track.restarted_ns = track.now_ns
         track.doubts, track.is_doubtful = 0, False
         track.alternatives = [
-            Alternative(first_state(other, person.fit.hessian), 0.0, track.now_ns)
-            for other in person.fit.runners_up[: self.config.hypotheses - 1]]
+            Alternative(first_state(other, found.hessian), 0.0, track.now_ns)
+            for other in found.runners_up[: self.config.hypotheses - 1]]
 
     def _fit(
         self, track: PersonTrack, observation: Observation, lifted: LiftedJoints | None
@@ -161,7 +162,7 @@ class Follower:
         self, track: PersonTrack, fresh: FreshFit, lifted: LiftedJoints | None
     ) -> FilterState:
         """Return the belief in a fresh fit of a known person: the shape stays theirs."""
-        found = fresh.person.fit
+        found = fresh.person.body
         assert found is not None
         belief = first_state(found.parameters, found.hessian)
         belief = with_known_shape(belief, track.filter, self.pipeline.model)

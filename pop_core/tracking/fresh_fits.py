@@ -1,17 +1,29 @@
 """Bodies fitted from retrieved poses for a tracker: at once, or while it follows the others.
 
-Such a fit takes as long as ten tracked frames. Given an executor it runs beside them, one at a
-time, and what it found is moved on to the frame in which it is ready. Without one, the default,
+Such a fit takes as long as ten tracked frames. Given somebody who makes it meanwhile, one at a
+time, the tracker goes on, and moves what was found on to the frame in which it is ready. Without,
 every frame waits for its fits, so that results do not depend on the machine.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
-from concurrent.futures import Executor, Future
+from collections.abc import Collection
+from concurrent.futures import Future
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
-from pop_core.pipeline import PersonFit
+from pop_core.keypoints.detection import Detection
+from pop_core.pipeline import BodyPipeline, Scene
+from pop_core.tracking.finder import FoundPerson, find_person
+
+
+@runtime_checkable
+class BackgroundFinder(Protocol):
+    """Whoever fits people meanwhile."""
+
+    def submit(self, scene: Scene, detection: Detection) -> Future[FoundPerson]:
+        """Begin what `find_person` does."""
+        ...
 
 
 @dataclass(slots=True, eq=False)
@@ -27,7 +39,7 @@ class Asked:
 
     track: int | None
     stamp_ns: int
-    future: Future[PersonFit]
+    future: Future[FoundPerson]
     is_ready: bool = False
 
 
@@ -36,20 +48,20 @@ class FreshFit:
     """A person fitted as if their frame stood alone.
 
     Args:
-        person: What became of the fit.
+        person: Who was found.
         stamp_ns: Stamp of the frame.
     """
 
-    person: PersonFit
+    person: FoundPerson
     stamp_ns: int
 
 
 class FreshFits:
     """Has one fit at a time made, and keeps it until it is called for."""
 
-    def __init__(self, executor: Executor | None = None) -> None:
-        """Have fits made by an executor; None makes each while it is asked for."""
-        self._executor = executor
+    def __init__(self, background: BackgroundFinder | None = None) -> None:
+        """Have fits made meanwhile; None makes each while it is asked for."""
+        self._background = background
         self._asked: Asked | None = None
 
     @property
@@ -65,21 +77,27 @@ class FreshFits:
         return self._asked.is_ready
 
     def ask(
-        self, fit: Callable[[], PersonFit], track: int | None, stamp_ns: int, *, wait: bool
+        self, pipeline: BodyPipeline, scene: Scene, detection: Detection, track: int | None, *,
+        wait: bool,
     ) -> None:
         """Have a person fitted, unless another fit is being made.
 
         Args:
-            fit: Fits the person.
+            pipeline: Makes the fit where it is waited for.
+            scene: The frame.
+            detection: The person in it.
             track: Number of the person's track; None for somebody new.
-            stamp_ns: Stamp of the frame that is fitted.
             wait: Whether to have it at once, since nobody is kept waiting.
         """
-        if not self.is_busy:
-            self._asked = (
-                Asked(track, stamp_ns, _done(fit()), is_ready=True)
-                if wait or self._executor is None
-                else Asked(track, stamp_ns, self._executor.submit(fit)))
+        if self.is_busy:
+            return
+        stamp_ns = scene.frame.stamp_ns
+        if wait or self._background is None:
+            future: Future[FoundPerson] = Future()
+            future.set_result(find_person(pipeline, scene, detection))
+            self._asked = Asked(track, stamp_ns, future, is_ready=True)
+        else:
+            self._asked = Asked(track, stamp_ns, self._background.submit(scene, detection))
 
     def take(self, track: int | None) -> FreshFit | None:
         """Return the fit of a track, or of somebody new, once it is ready.
@@ -101,9 +119,3 @@ class FreshFits:
     def forget(self) -> None:
         """Forget what is being made; it is finished, but nobody will hear of it."""
         self._asked = None
-
-
-def _done(person: PersonFit) -> Future[PersonFit]:
-    future: Future[PersonFit] = Future()
-    future.set_result(person)
-    return future

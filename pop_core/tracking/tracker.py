@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +21,7 @@ from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, 
 from pop_core.tracking.doubts import count_misses, is_doubtful, is_settled, is_stale
 from pop_core.tracking.finder import Finder, Found
 from pop_core.tracking.follower import Follower
-from pop_core.tracking.fresh_fits import FreshFit, FreshFits
+from pop_core.tracking.fresh_fits import BackgroundFinder, FreshFit, FreshFits
 from pop_core.tracking.track import PersonTrack, new_track
 from pop_core.tracking.tracking_config import TrackingConfig
 
@@ -34,15 +33,15 @@ class BodyTracker:
 
     def __init__(
         self, pipeline: BodyPipeline, config: TrackingConfig | None = None,
-        executor: Executor | None = None,
+        background: BackgroundFinder | None = None,
     ) -> None:
         """Prepare to follow people with a pipeline's model, detector and settings.
 
-        An executor finds people anew while the others are followed, for use at camera rate;
-        without one each frame waits, so that frames give the same bodies on any machine.
+        Given somebody who finds people anew meanwhile, nobody waits for that but the person, as
+        camera rate asks for; without, frames give the same bodies on any machine.
         """
         self._blas = ThreadpoolController()
-        self._fresh = FreshFits(executor)
+        self._fresh = FreshFits(background)
         self._next_id = 0
         self._tracks: list[PersonTrack] = []
         self._gap = Gap(0.0)
@@ -183,7 +182,7 @@ class BodyTracker:
                 with watch.step('restart'):
                     self._ask(scene, found, index, track.id)
                 fresh = self._fresh.take(track.id)
-        rival = fresh if fresh is not None and fresh.person.fit is not None else None
+        rival = fresh if fresh is not None and fresh.person.body is not None else None
         if rival is not None and elsewhere:
             self._follower.restart(track, rival, lifted)
         elif track.state is TrackState.LOST and lifted is None:
@@ -194,7 +193,7 @@ class BodyTracker:
     def _ask(self, scene: Scene, found: Found, index: int, number: int | None = None) -> None:
         """Have a detected person fitted from retrieved poses."""
         self._fresh.ask(
-            lambda: self._finder.fit(scene, found, index), number, scene.frame.stamp_ns,
+            self.pipeline, scene, found.detections[index], number,
             wait=self._gap.is_of_slow_camera or not any(t.is_shown for t in self._tracks))
 
     def _begin(
@@ -216,12 +215,12 @@ class BodyTracker:
     def _welcome(self, fresh: FreshFit) -> PersonTrack | None:
         """Return a new track of whoever was found, at the time of the frame that was fitted."""
         person = fresh.person
-        if person.estimate is None or person.fit is None:
+        if person.estimate is None or person.body is None:
             return None
         track = new_track(
-            self._next_id, first_state(person.fit.parameters, person.fit.hessian),
+            self._next_id, first_state(person.body.parameters, person.body.hessian),
             person.estimate, person.estimate.score, fresh.stamp_ns)
         self._next_id += 1
-        self._follower.begin(track, person)
+        self._follower.begin(track, person.body)
         self._tracks.append(track)
         return track

@@ -1,6 +1,5 @@
 """A tracker, what it sees, and the clock: one person before a wall, or behind a board."""
 
-from concurrent.futures import Executor
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +12,7 @@ from pop_core.keypoints.detection import Detection
 from pop_core.pipeline import BodyPipeline
 from pop_core.retrieval.default_library import default_library
 from pop_core.rgbd import RgbdFrame
+from pop_core.tracking.fresh_fits import BackgroundFinder
 from pop_core.tracking.tracker import BodyTracker
 from pop_core.tracking.tracking_config import TrackingConfig
 
@@ -42,11 +42,11 @@ class Stage:
 
     def __init__(
         self, body: BodyModel, config: TrackingConfig | None = None,
-        executor: Executor | None = None,
+        background: BackgroundFinder | None = None,
     ) -> None:
         self.body, self.source = body, Scripted(body)
         pipeline = BodyPipeline(body, default_library(), self.source)
-        self.tracker = BodyTracker(pipeline, config, executor)
+        self.tracker = BodyTracker(pipeline, config, background)
         self.stamp_ns, self.statuses = 1_000_000_000, ()
 
     def show(

@@ -1,7 +1,6 @@
 """People found anew beside the others: who waits, who does not, and what comes in late."""
 
-from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 
 import numpy as np
 import pytest
@@ -9,9 +8,12 @@ from support.stage import RATE_HZ, Stage, only
 
 from pop_core.body.kinematics import joints
 from pop_core.body.model import BodyModel, BodyParameters
+from pop_core.depth_noise import USUAL_NOISE
 from pop_core.estimate import EstimateStatus, TrackState
-from pop_core.pipeline import PersonFit
+from pop_core.keypoints.detection import Detection
+from pop_core.pipeline import Scene
 from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, Gap
+from pop_core.tracking.finder import find_person
 from pop_core.tracking.fresh_fits import FreshFits
 from pop_core.tracking.track import PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
@@ -20,24 +22,28 @@ STEP_M = 0.05
 TO_THE_LEFT_M = -0.9
 
 
-class Late(Executor):
-    """Does what it is given when it is told to."""
+class Late:
+    """Finds people when it is told to."""
 
     def __init__(self) -> None:
-        self.waiting: list[tuple[Future, Callable]] = []
-        self.asked = 0
+        self.waiting: list[tuple[Future, Scene, Detection]] = []
+        self.asked, self.pipeline = 0, None
 
-    def submit(self, work: Callable) -> Future:
+    def submit(self, scene: Scene, detection: Detection) -> Future:
         self.asked += 1
-        self.waiting.append((Future(), work))
+        self.waiting.append((Future(), scene, detection))
         return self.waiting[-1][0]
 
     def finish(self) -> None:
-        for future, work in self.waiting:
-            try:
-                future.set_result(work())
-            except ZeroDivisionError as error:
-                future.set_exception(error)
+        """Finish what waits."""
+        for future, scene, detection in self.waiting:
+            future.set_result(find_person(self.pipeline, scene, detection))
+        self.waiting.clear()
+
+    def fail(self) -> None:
+        """Fail to do what waits."""
+        for future, _, _ in self.waiting:
+            future.set_exception(MemoryError())
         self.waiting.clear()
 
 
@@ -52,7 +58,9 @@ def late() -> Late:
 
 @pytest.fixture
 def stage(body: BodyModel, late: Late) -> Stage:
-    return Stage(body, executor=late)
+    made = Stage(body, background=late)
+    late.pipeline = made.tracker.pipeline
+    return made
 
 
 def test_nobody_waits_where_nobody_is_followed(
@@ -121,35 +129,45 @@ def test_what_is_found_after_a_reset_belongs_to_nobody(
     assert only(stage.show(person)).track.id == 0
 
 
-def test_an_error_of_a_late_fit_is_raised_once_and_people_are_found_after_it() -> None:
-    late, made = Late(), []
+def asked(
+    stage: Stage, late: Late, person: BodyParameters, track: int | None = None
+) -> FreshFits:
+    """Return fits one of which was asked for."""
     fits = FreshFits(late)
-    fits.ask(lambda: 1 / 0, None, 0, wait=False)
-    late.finish()
+    frame = stage.frame(person, hidden=False)
+    scene = Scene(frame, None, USUAL_NOISE, np.zeros(frame.depth_m.shape, dtype=bool))
+    detection = stage.source.detection(frame, person)
+    fits.ask(stage.tracker.pipeline, scene, detection, track, wait=False)
+    return fits
+
+
+def test_an_error_of_a_late_fit_is_raised_once(
+    stage: Stage, late: Late, person: BodyParameters
+) -> None:
+    fits = asked(stage, late, person)
+    late.fail()
     assert fits.poll()
-    with pytest.raises(ZeroDivisionError):
+    with pytest.raises(MemoryError):
         fits.take(None)
-    fits.ask(lambda: made.append(1) or PersonFit(EstimateStatus.OK), None, 7, wait=False)
-    late.finish()
-    assert fits.poll()
-    assert fits.take(None).stamp_ns == 7
+    assert not fits.is_busy
 
 
-def test_a_fit_is_ready_for_whole_frames_only_and_for_its_owner_only() -> None:
-    late = Late()
-    fits = FreshFits(late)
-    fits.ask(lambda: PersonFit(EstimateStatus.OK), 3, 0, wait=False)
+def test_a_fit_is_ready_for_whole_frames_only_and_for_its_owner_only(
+    stage: Stage, late: Late, person: BodyParameters
+) -> None:
+    fits = asked(stage, late, person, 3)
     late.finish()
     assert fits.take(3) is None  # it became ready within the frame
     assert fits.poll()
     assert fits.take(None) is None
-    assert fits.take(3) is not None
+    assert fits.take(3).person.status is EstimateStatus.OK
     assert not fits.is_busy
 
 
-def test_a_fit_of_a_track_that_has_ended_keeps_nobody_waiting() -> None:
-    fits = FreshFits(Late())
-    fits.ask(lambda: PersonFit(EstimateStatus.OK), 3, 0, wait=False)
+def test_a_fit_of_a_track_that_has_ended_keeps_nobody_waiting(
+    stage: Stage, late: Late, person: BodyParameters
+) -> None:
+    fits = asked(stage, late, person, 3)
     fits.forget_unless({3})
     assert fits.is_busy
     fits.forget_unless({4})

@@ -1,0 +1,101 @@
+"""The process that fits people for a node: the same people, errors by name, a shared end."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.node import ROOT
+from support.one_person import facing_person
+from support.stage import Stage
+
+from pop_core.body.default_body import default_body
+from pop_core.config import PipelineConfig
+from pop_core.depth_noise import USUAL_NOISE
+from pop_core.estimate import EstimateStatus
+from pop_core.keypoints.detection import Detection
+from pop_core.pipeline import Scene
+from pop_core.tracking.finder import find_person
+from pop_ros.finding_process import FindingError, FindingProcess
+
+WAIT_S = 120.0
+
+
+@pytest.fixture(scope='module')
+def stage() -> Stage:
+    return Stage(default_body())
+
+
+@pytest.fixture(scope='module')
+def seen(stage: Stage) -> tuple[Scene, Detection]:
+    person = facing_person(np.zeros(10))
+    frame = stage.frame(person, hidden=False)
+    scene = Scene(frame, None, USUAL_NOISE, np.zeros(frame.depth_m.shape, dtype=bool))
+    return scene, stage.source.detection(frame, person)
+
+
+@pytest.fixture
+def finding() -> Iterator[FindingProcess]:
+    made = FindingProcess()
+    yield made
+    made.stop()
+
+
+def child_of(finding: FindingProcess) -> int:
+    process = finding._process
+    assert process is not None
+    return process.pid
+
+
+def is_running(pid: int) -> bool:
+    try:
+        return Path(f'/proc/{pid}/stat').read_text().rsplit(')', 1)[1].split()[0] != 'Z'
+    except OSError:
+        return False
+
+
+def test_it_finds_whom_the_node_itself_would_find_with_the_settings_of_the_moment(
+    finding: FindingProcess, stage: Stage, seen: tuple[Scene, Detection]
+) -> None:
+    finding.start()
+    there = finding.submit(*seen).result(WAIT_S)
+    here = find_person(stage.tracker.pipeline, *seen)
+    np.testing.assert_array_equal(there.estimate.vertices, here.estimate.vertices)
+    np.testing.assert_array_equal(there.body.hessian, here.body.hessian)
+    finding.configure(PipelineConfig(max_range_m=1.0))
+    assert finding.submit(*seen).result(WAIT_S).status is EstimateStatus.TOO_FAR
+
+
+def test_an_error_there_is_an_error_here_and_a_dead_process_is_replaced(
+    finding: FindingProcess, seen: tuple[Scene, Detection]
+) -> None:
+    with pytest.raises(AttributeError):
+        finding.submit('no scene', seen[1]).result(WAIT_S)
+    waiting = finding.submit(*seen)
+    os.kill(child_of(finding), signal.SIGKILL)
+    with pytest.raises(FindingError, match='ended with code -9'):
+        waiting.result(WAIT_S)
+    assert finding.submit(*seen).result(WAIT_S).status is EstimateStatus.OK
+
+
+@pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGINT])
+def test_nothing_is_left_of_a_node_that_was_killed(number: signal.Signals) -> None:
+    code = (f'import sys; sys.path.insert(0, {str(ROOT)!r}); '
+            'from pop_ros.finding_process import FindingProcess; f = FindingProcess(); f.start(); '
+            'import time; time.sleep(1); print(f._process.pid, flush=True); time.sleep(60)')
+    node = subprocess.Popen(
+        [sys.executable, '-c', code], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    assert node.stdout is not None
+    pid = int(node.stdout.readline())
+    assert is_running(pid)
+    node.send_signal(number)
+    end_s = time.monotonic() + 30
+    while is_running(pid) and time.monotonic() < end_s:
+        time.sleep(0.1)
+    assert not is_running(pid)
+    node.wait(30)
