@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Bool
 
 from pop_core.estimate import BodyEstimate
 from pop_core.fitting.body_fit import BodyFit
@@ -29,7 +30,7 @@ from pop_core.tracking.fresh_fits import FreshFit
 from pop_core.tracking.late_belief import caught_up, moved_on
 from pop_core.tracking.limb_claims import limbs_of
 from pop_core.tracking.limb_search import LimbSearch
-from pop_core.tracking.limbs import contradicted_joints, limb_bones, loosened
+from pop_core.tracking.limbs import contradicted_joints, loosened, lost_limbs
 from pop_core.tracking.liveliness import followed_trail, liveliness
 from pop_core.tracking.motion import N_MOVING
 from pop_core.tracking.rivals import costs, follow_alternatives
@@ -46,7 +47,7 @@ UNUSUAL, UNUSUAL_M = 1.5, 0.01  # E_depth above this many times the usual and th
 TRUSTED_SUPPORT = 0.5
 # Standard deviations are wider than the filter's own by this: frames err together, and a limb may
 # be taken for another (`python -m benchmarks tracking`, coverage rows).
-OVERSURE = 1.5
+OVERSURE = 1.36
 HIDDEN_TURN_RAD = 0.5  # people hidden for a while come out much as they went in
 RESOLVED = 8.0  # cost that a body may be worse by for each joint that agrees with it instead
 
@@ -172,22 +173,27 @@ class Follower:
     def _without_lost_limbs(
         self, track: PersonTrack, fit: WarmFit, observation: Observation, lifted: LiftedJoints
     ) -> WarmFit:
-        """Look anew for limbs that keypoints contradict; return the better explanation."""
-        contradicted = contradicted_joints(fit.state, lifted)
-        loose = limb_bones(contradicted)
-        if not loose.any():
-            return fit
+        """Look anew for arms or legs that keypoints contradict; return the better fit."""
+        for loose in lost_limbs(contradicted_joints(fit.state, lifted)):
+            fit = self._with_limb_found(track, fit, observation, lifted, loose)
+        return fit
+
+    def _with_limb_found(
+        self, track: PersonTrack, fit: WarmFit, observation: Observation, lifted: LiftedJoints,
+        loose: Bool[np.ndarray, '24'],
+    ) -> WarmFit:
+        """Return a fit with some limbs looked for anew, if that explains more."""
         free = replace(
             loosened(track.filter, loose),
             parameters=self.limb_search.find(fit.state, observation, loose))
         other = self.warm.fit(
             free, observation, self.config.steps, detected=True, loose=loose)
         ours, theirs = costs(self.warm.fitter, [fit, other], observation)
-        resolved = int(contradicted.sum() - contradicted_joints(other.state, lifted).sum())
+        before, after = (contradicted_joints(f.state, lifted).sum() for f in (fit, other))
         # A keypoint may itself be wrong: a limb is where measured points are its own.
         limbs = limbs_of(loose)
         is_seen = other.of_limb[limbs].sum() > fit.of_limb[limbs].sum()
-        if theirs >= ours + RESOLVED * resolved or not is_seen:
+        if theirs >= ours + RESOLVED * int(before - after) or not is_seen:
             return fit
         track.filter = free
         return other

@@ -32,14 +32,19 @@ def contradicted_joints(body: BodyState, lifted: LiftedJoints) -> Bool[np.ndarra
     return lifted.lifted & far & (lifted.scores >= SURE_SCORE)
 
 
-def limb_bones(contradicted: Bool[np.ndarray, 's']) -> Bool[np.ndarray, '24']:
-    """Return the joints of the limbs that contradicted joints belong to; none of the trunk."""
-    out = np.zeros(N_JOINTS, dtype=bool)
+def lost_limbs(contradicted: Bool[np.ndarray, 's']) -> list[Bool[np.ndarray, '24']]:
+    """Return the joints of the arms, and of the legs, that contradicted joints belong to.
+
+    Two of a kind are lost together: they may have been exchanged.
+    """
+    found: dict[tuple[str, ...], Bool[np.ndarray, '24']] = {}
     for row in np.flatnonzero(contradicted):
         side, _, kind = SHARED_NAMES[row].partition('_')
-        for part in LIMB_OF.get(kind, ()):
-            out[JOINT_INDEX[f'{side}_{part}']] = True
-    return out
+        parts = LIMB_OF.get(kind)
+        if parts is not None:
+            bones = found.setdefault(parts, np.zeros(N_JOINTS, dtype=bool))
+            bones[[JOINT_INDEX[f'{side}_{part}'] for part in parts]] = True
+    return list(found.values())
 
 
 def loosened(predicted: FilterState, bones: Bool[np.ndarray, '24']) -> FilterState:

@@ -10,7 +10,7 @@ from pop_core.fitting.body_state import FitBody
 from pop_core.fitting.observation import observe
 from pop_core.retrieval.pose_prior import load_pose_prior
 from pop_core.tracking.limb_search import LimbSearch
-from pop_core.tracking.limbs import limb_bones
+from pop_core.tracking.limbs import lost_limbs
 
 
 @pytest.mark.parametrize('turn', [[0.0, -1.4, -0.3], [0.6, 0.9, -0.9], [0.0, 0.0, 0.4]])
@@ -26,7 +26,7 @@ def test_an_arm_is_found_wherever_its_keypoints_are(
     ends = [SHARED_INDEX['left_elbow'], SHARED_INDEX['left_wrist']]
     contradicted = np.zeros(15, dtype=bool)
     contradicted[ends] = True
-    loose = limb_bones(contradicted)
+    (loose,) = lost_limbs(contradicted)
     coarse = FitBody(body, full=False)
     search = LimbSearch(load_pose_prior())
     found = search.find(coarse.state(person), observation, loose)
