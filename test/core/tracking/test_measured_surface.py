@@ -46,10 +46,11 @@ def knowledge(state: BodyState, terms: SurfaceTerms, observation: Observation) -
     return energy.curvature(state)[0].data
 
 
-def test_an_empty_room_moves_a_body_but_tells_nothing_of_its_place(
-    body: BodyModel, state: BodyState
+def test_free_space_moves_a_body_but_tells_nothing_of_its_place(
+    body: BodyModel, state: BodyState, person: BodyParameters
 ):
-    terms, observation = terms_of(body, state)
+    somebody_to_hide_behind = person.replaced(transl=person.transl + [1.0, 0.0, -0.4])
+    terms, observation = terms_of(body, state, somebody_to_hide_behind)
     assert terms.n_measured == 0
     assert terms.pairs.weight.any()
     assert not knowledge(state, terms, observation).any()
