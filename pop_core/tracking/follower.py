@@ -117,12 +117,12 @@ class Follower:
             other.filter = moved_on(other.filter, self.pipeline.fitter.coarse, late_s, lifted)
         track.depth_level = None
 
-    def catch_up(self, track: PersonTrack, lifted: LiftedJoints) -> None:
-        """Move a person who was fitted while time went on to where keypoints are by now."""
+    def catch_up(self, track: PersonTrack, lifted: LiftedJoints, late_s: float) -> None:
+        """Move a person to where keypoints are, which were there `late_s` ago [s] at most."""
         body = self.pipeline.fitter.coarse
-        track.filter = caught_up(track.filter, body, track.gap_s, lifted)
+        track.filter = caught_up(track.filter, body, late_s, lifted)
         for other in track.alternatives:
-            other.filter = caught_up(other.filter, body, track.gap_s, lifted)
+            other.filter = caught_up(other.filter, body, late_s, lifted)
 
     def begin(self, track: PersonTrack, found: FoundBody) -> None:
         """Keep the other explanations of a fresh fit while they may be true."""

@@ -18,7 +18,7 @@ from pop_core.stopwatch import Stopwatch
 from pop_core.tracking.association import Expected, associate, offset_m
 from pop_core.tracking.body_filter import first_state
 from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, Gap
-from pop_core.tracking.doubts import count_misses, is_doubtful, is_settled, is_stale
+from pop_core.tracking.doubts import STALE_S, count_misses, is_doubtful, is_settled, is_stale
 from pop_core.tracking.finder import Finder, Found
 from pop_core.tracking.follower import Follower
 from pop_core.tracking.fresh_fits import BackgroundFinder, FreshFit, FreshFits
@@ -175,13 +175,15 @@ class BodyTracker:
         if index is not None:
             lifted = self._finder.lifted_behind(scene, found, index)
             elsewhere = elsewhere or astray
-            is_late = track.has_just_begun and track.gap_s > LONG_GAP_S
-            if is_late and not self._gap.is_of_slow_camera:
-                self._follower.catch_up(track, lifted)
-            elif fresh is None and (elsewhere or is_doubtful(track, self._gap)):
+            late_s = self._late_s(track)
+            if fresh is None and late_s == 0.0 and (elsewhere or is_doubtful(track, self._gap)):
                 with watch.step('restart'):
                     self._ask(scene, found, index, track.id)
                 fresh = self._fresh.take(track.id)
+                if elsewhere and self._fresh.is_busy:
+                    late_s = max(track.unseen_s, STALE_S)
+            if late_s > 0.0:
+                self._follower.catch_up(track, lifted, late_s)
         rival = fresh if fresh is not None and fresh.person.body is not None else None
         if rival is not None and elsewhere:
             self._follower.restart(track, rival, lifted)
@@ -190,11 +192,16 @@ class BodyTracker:
         with watch.step('follow'):
             return self._follower.follow(track, scene, lifted, None if elsewhere else rival)
 
+    def _late_s(self, track: PersonTrack) -> float:
+        """Return for how long a person has walked on unseen while the first fit was made [s]."""
+        is_late = track.has_just_begun and track.gap_s > LONG_GAP_S
+        return track.gap_s if is_late and not self._gap.is_of_slow_camera else 0.0
+
     def _ask(self, scene: Scene, found: Found, index: int, number: int | None = None) -> None:
-        """Have a detected person fitted from retrieved poses."""
+        """Have a detected person fitted from retrieved poses; wait where nobody is known."""
         self._fresh.ask(
             self.pipeline, scene, found.detections[index], number,
-            wait=self._gap.is_of_slow_camera or not any(t.is_shown for t in self._tracks))
+            wait=self._gap.is_of_slow_camera or not self._tracks)
 
     def _begin(
         self, scene: Scene, found: Found, index: int, watch: Stopwatch

@@ -113,9 +113,10 @@ def test_people_followed_do_not_wait_for_one_who_is_looked_for_anew(
     away = person.replaced(transl=person.transl + [-0.75, 0.0, 0.0])  # where nobody can run to
     shown = [stage.show(away) for _ in range(4)]
     assert late.asked == 1
+    # Keypoints, which are not there in every frame, move them meanwhile.
+    assert only(shown[-1]).joints[0] == pytest.approx(joints(stage.body, away)[0], abs=0.1)
     late.finish()
-    assert only(stage.show(away)).joints[0] == pytest.approx(away.transl, abs=0.4)
-    assert all(len(bodies) <= 1 for bodies in shown)
+    assert only(stage.show(away)).joints[0] == pytest.approx(joints(stage.body, away)[0], abs=0.1)
 
 
 def test_what_is_found_after_a_reset_belongs_to_nobody(
