@@ -26,6 +26,9 @@ from pop_core.tracking.finder import FoundPerson, find_person
 from pop_ros.sources import make_pipeline
 
 
+NICENESS = 5  # where processors are scarce those who are followed go first
+
+
 class FindingError(PopError):
     """The process that fits people ended."""
 
@@ -133,6 +136,7 @@ def answer_jobs(jobs: BinaryIO, answers: BinaryIO) -> None:
 
 def main() -> None:
     """Answer on what was the standard output; whatever is printed goes elsewhere."""
+    os.nice(NICENESS)
     with os.fdopen(os.dup(1), 'wb') as answers:
         os.dup2(2, 1)
         answer_jobs(sys.stdin.buffer, answers)
