@@ -25,7 +25,6 @@ from pop_core.rgbd import RgbdFrame
 from pop_core.tracking.finder import FoundPerson, find_person
 from pop_ros.sources import make_pipeline
 
-
 NICENESS = 5  # where processors are scarce those who are followed go first
 
 
