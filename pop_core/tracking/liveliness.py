@@ -8,9 +8,9 @@ that moves, or that nobody sees, gets all of it.
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
-from pop_core.body.joints import JOINT_INDEX, N_JOINTS, PARENTS
+from pop_core.body.joints import N_JOINTS, PARENTS
 from pop_core.estimate import JointState
 
 TRAIL_S = 0.15  # how fast the past is forgotten
@@ -19,18 +19,21 @@ SHORT_M = 0.15  # noise of the ends of a short bone turns it far
 LEAST = 0.03  # of the velocity noise: nobody is a statue
 
 
-def _next_joint() -> Int[np.ndarray, '24']:
-    """Return the joint that shows each joint's rotation; the last of a limb shows its parent's."""
-    out = np.arange(N_JOINTS)
-    for child in reversed(range(1, N_JOINTS)):
-        out[PARENTS[child]] = child
-    out[[0, JOINT_INDEX['spine3']]] = JOINT_INDEX['spine1'], JOINT_INDEX['neck']
-    return out
+def _own_bones() -> Bool[np.ndarray, '24 24']:
+    """Return which bones, named by their lower ends, hang on each joint.
+
+    A joint at the end of a limb turns as its parent does, as far as anybody can tell.
+    """
+    own = np.zeros((N_JOINTS, N_JOINTS), dtype=bool)
+    own[PARENTS[1:], range(1, N_JOINTS)] = True
+    ends = ~own.any(axis=1)
+    own[ends] = np.eye(N_JOINTS, dtype=bool)[ends]
+    return own
 
 
-NEXT = _next_joint()
-# A joint at the end of a limb turns as its parent does, as far as anybody can tell.
-BASE = np.where(NEXT == np.arange(N_JOINTS), np.array(PARENTS), np.arange(N_JOINTS))
+OWN = _own_bones()
+# A turn about a bone moves only what follows.
+SHOWN_BY = OWN | (OWN.astype(np.int64) @ OWN > 0)
 
 
 def followed_trail(
@@ -51,12 +54,11 @@ def liveliness(
         trail: Where they were of late [m].
         joint_state: A JointState per joint.
     """
-    left = joints - trail
-    bone = joints[NEXT] - joints[BASE]
-    length = np.maximum(np.linalg.norm(bone, axis=1), SHORT_M)
-    turned = np.linalg.norm(left[NEXT] - left[BASE], axis=1) / length / TURN_RAD
-    shifted = np.linalg.norm(left[0]) / SHIFT_M
-    unseen = joint_state != JointState.VISIBLE
-    moved = np.append(shifted, turned)
-    moved[np.append(unseen[0], unseen[NEXT])] = 1.0
-    return np.repeat(np.clip(moved**2, LEAST, 1.0), 3)
+    left, start = joints - trail, np.maximum(PARENTS, 0)
+    length = np.maximum(np.linalg.norm(joints - joints[start], axis=1), SHORT_M)
+    of_bone = np.linalg.norm(left - left[start], axis=1) / length / TURN_RAD
+    seen = joint_state == JointState.VISIBLE
+    turned = np.where(SHOWN_BY & seen, of_bone, 0.0).max(axis=1)
+    turned[~(OWN & seen).any(axis=1)] = 1.0
+    shifted = np.linalg.norm(left[0]) / SHIFT_M if seen[0] else 1.0
+    return np.repeat(np.clip(np.append(shifted, turned) ** 2, LEAST, 1.0), 3)

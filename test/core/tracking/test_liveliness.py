@@ -38,10 +38,20 @@ def test_noise_of_a_sensor_is_no_life(joints: np.ndarray):
     assert liveliness(joints + noise, joints, SEEN).max() < 0.3
 
 
-def test_a_forearm_that_swings_makes_its_elbow_lively_alone(joints: np.ndarray):
+def test_a_forearm_that_swings_makes_elbow_and_upper_arm_lively_alone(joints: np.ndarray):
     moved = joints.copy()
     moved[[JOINT_INDEX['left_wrist'], JOINT_INDEX['left_hand']]] += [0.05, 0.0, 0.0]
-    assert lively_parts(liveliness(moved, joints, SEEN)) == turns_of('left_elbow')
+    lively = turns_of('left_elbow', 'left_shoulder')  # the upper arm may turn about itself
+    assert lively_parts(liveliness(moved, joints, SEEN)) == lively
+
+
+def test_who_turns_round_is_lively_though_the_spine_stays(joints: np.ndarray):
+    angle = 0.1
+    turn = np.array([
+        [np.cos(angle), 0.0, np.sin(angle)], [0.0, 1.0, 0.0],
+        [-np.sin(angle), 0.0, np.cos(angle)]])
+    moved = (joints - joints[0]) @ turn.T + joints[0]
+    assert turns_of('pelvis') <= lively_parts(liveliness(moved, joints, SEEN))
 
 
 def test_who_walks_stiffly_only_changes_place(joints: np.ndarray):
