@@ -40,6 +40,8 @@ from pop_core.segmentation.ground import Ground, find_ground
 from pop_core.stopwatch import Stopwatch
 
 SMALLEST_EXTENT_M = 0.15  # joints nearer together than this are no skeleton
+DOUBTFUL_SCORE = 0.65  # a body that explains so little may be somebody seen from the other side
+CLEARLY_BETTER = 0.1  # by how much the score must rise for it
 SAME_PLACE_M = 0.3  # a person behind another is often lifted onto the one in front
 
 
@@ -135,6 +137,30 @@ class BodyPipeline:
         return bodies, statuses
 
     def fit_person(
+        self,
+        scene: Scene,
+        detection: Detection,
+        lifted: LiftedJoints,
+        watch: Stopwatch,
+    ) -> PersonFit:
+        """Fit one person; where that explains little, with left and right exchanged, too.
+
+        A detector that takes a back for a front names every joint after the other side, and
+        retrieval believes it.
+        """
+        person = self._fit_as_named(scene, detection, lifted, watch)
+        score = 1.0 if person.estimate is None else person.estimate.score
+        if score > DOUBTFUL_SCORE or not self.config.fitting.other_readings:
+            return person
+        other = detection.with_sides_exchanged()
+        lifted = self.lift(scene.frame, other)
+        if self.admit(lifted) is not EstimateStatus.OK:
+            return person
+        again = self._fit_as_named(scene, other, lifted, watch)
+        better = again.estimate is not None and again.estimate.score > score + CLEARLY_BETTER
+        return again if better else person
+
+    def _fit_as_named(
         self,
         scene: Scene,
         detection: Detection,

@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from pop_core.body.joints import MIRROR, SHARED_MIRROR
+from pop_core.body.joints import SHARED_MIRROR
 from pop_core.depth_noise import USUAL_NOISE, DepthNoise
 from pop_core.geometry.camera import Camera
+from pop_core.keypoints.body_parts import LABEL_MIRROR
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.rgbd import RgbdFrame, flying_pixels
 from pop_core.segmentation.ground import Ground
@@ -104,7 +105,7 @@ class Observation:
         return replace(
             self, lifted=self.lifted.with_sides_exchanged(),
             keypoint_rays=replace(rays, joint=SHARED_MIRROR[rays.joint]),
-            labels=None if labels is None else np.where(labels < 0, -1, MIRROR[labels]))
+            labels=None if labels is None else LABEL_MIRROR[labels])
 
     def depth_at(
         self, p_camera: Float[np.ndarray, 'n 3']

@@ -20,7 +20,7 @@ from pop_core.fitting.limb_exchange import Judge
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.side_exchange import turned_around, with_legs_exchanged
 
-MARGIN = 5.0  # cost that another reading must save: detectors rarely take left for right
+MARGIN = 2.0  # cost that another reading must save: detectors rarely take left for right
 HOPEFUL = 60.0  # a turned body may win once it is fitted, if it costs no more than this beyond
 LEG_JOINTS = [SHARED_INDEX[f'{side}_{name}'] for side in ('left', 'right')
               for name in ('knee', 'ankle')]

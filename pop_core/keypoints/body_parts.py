@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pop_core.body.joints import JOINT_INDEX, JOINT_NAMES, mirrored_name
+from pop_core.body.joints import JOINT_INDEX, JOINT_NAMES, MIRROR, mirrored_name
 
 # Named by the joint that stands for the part in label images.
 PART_NAMES = (
@@ -23,5 +23,7 @@ N_CLASSES = 1 + len(PART_NAMES)
 CLASS_OF_LABEL = np.array(
     [1 + PART_NAMES.index(_JOINED.get(name, name)) for name in JOINT_NAMES] + [BACKGROUND])
 LABEL_OF_CLASS = np.array([-1, *(JOINT_INDEX[name] for name in PART_NAMES)], dtype=np.int8)
+# Label of the other side, the last entry for label -1.
+LABEL_MIRROR = np.array([*MIRROR, -1], dtype=np.int8)
 CLASS_MIRROR = np.array(
     [BACKGROUND, *(1 + PART_NAMES.index(mirrored_name(name)) for name in PART_NAMES)])

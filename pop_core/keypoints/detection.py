@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool, Float, Int8
+from jaxtyping import Bool, Float, Int, Int8
 
+from pop_core.body.joints import SHARED_MIRROR
+from pop_core.keypoints.body_parts import LABEL_MIRROR
 from pop_core.rgbd import RgbdFrame
 
 
@@ -40,6 +42,22 @@ class Detection:
     def score(self) -> float:
         """Return the mean confidence over the 15 shared joints, undetected ones counting zero."""
         return float(self.scores.mean())
+
+    def with_sides_exchanged(self) -> Detection:
+        """Return the detection with every left joint and part called right, and vice versa."""
+        return replace(
+            self, keypoints_px=self.keypoints_px[SHARED_MIRROR],
+            scores=self.scores[SHARED_MIRROR],
+            joint_depth_m=_taken(self.joint_depth_m, SHARED_MIRROR),
+            joint_sigma_m=_taken(self.joint_sigma_m, SHARED_MIRROR),
+            visible=_taken(self.visible, SHARED_MIRROR),
+            part_labels=None if self.part_labels is None else LABEL_MIRROR[self.part_labels])
+
+
+def _taken(
+    values: Float[np.ndarray, 's'] | None, order: Int[np.ndarray, 's']
+) -> Float[np.ndarray, 's'] | None:
+    return None if values is None else values[order]
 
 
 @runtime_checkable  # so that tests can check arguments of this type

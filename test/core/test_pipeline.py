@@ -76,6 +76,17 @@ def test_the_same_frame_gives_the_same_bodies(scene: SyntheticScene, result: Fra
         np.testing.assert_array_equal(first.vertices, second.vertices)
 
 
+def test_backs_taken_for_fronts_give_the_same_bodies(
+    scene: SyntheticScene, result: FrameResult
+) -> None:
+    """A detector that confuses left and right in every joint of everybody."""
+    detections = [d.with_sides_exchanged() for d in scene.detections() if d is not None]
+    found = run(scene.frame, detections)
+    for body in result.bodies:
+        off = [np.linalg.norm(other.joints - body.joints, axis=1).mean() for other in found.bodies]
+        assert min(off) < 0.06
+
+
 def test_nobody_detected_is_an_empty_result(scene: SyntheticScene) -> None:
     empty = run(scene.frame, [])
     assert empty.bodies == ()
