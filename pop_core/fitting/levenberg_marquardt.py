@@ -106,6 +106,8 @@ def levenberg_marquardt_step(
 ) -> StepReport[StateT]:
     """Take one accepted step, raising the damping until the cost falls (or give up).
 
+    Where the cost has no derivative, as when a body has shrunk to nothing, nothing moves.
+
     Args:
         state: Where to linearise.
         evaluate: Returns the residual blocks of a state, with Jacobians when asked.
@@ -114,6 +116,8 @@ def levenberg_marquardt_step(
         damping: Damping of the last step.
     """
     equations = assemble(evaluate(state, True), len(active))
+    if not np.isfinite(equations.gradient).all():
+        return StepReport(state, equations.cost, equations.cost, FIRST_DAMPING, False)
     growth = 4.0
     while damping < LARGEST_DAMPING:
         step = damped_step(equations, damping, active)

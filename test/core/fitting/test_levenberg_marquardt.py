@@ -41,6 +41,13 @@ def test_a_minimum_is_left_alone() -> None:
     assert not report.accepted
 
 
+def test_nothing_moves_where_the_cost_has_no_derivative() -> None:
+    start = np.array([np.nan, 1.0])
+    report = levenberg_marquardt_step(start, rosenbrock, np.add, EVERYTHING, FIRST_DAMPING)
+    assert report.state is start
+    assert not report.accepted
+
+
 def test_weighted_normal_equations_are_those_of_the_textbook() -> None:
     rng = np.random.default_rng(0)
     r, J, w = rng.normal(size=9), rng.normal(size=(9, 4)), rng.random(9)
