@@ -12,7 +12,7 @@ from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.energy import PriorBelief
 from pop_core.fitting.hypotheses import Hypothesis
 from pop_core.fitting.observation import Observation
-from pop_core.tracking.track import Alternative, PersonTrack
+from pop_core.tracking.track import PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
 from pop_core.tracking.warm_start import WarmFit, WarmStart, updated
 
@@ -65,10 +65,3 @@ def follow_alternatives(
             kept.append(other)
     track.alternatives = kept
     return winner
-
-
-def alternatives_of(
-    beliefs: Sequence[Alternative], config: TrackingConfig
-) -> list[Alternative]:
-    """Return as many alternatives as may be followed."""
-    return list(beliefs[: config.hypotheses - 1])
