@@ -17,6 +17,7 @@ from pop_core.fitting.hypotheses import WIDEST_M, Hypothesis, HypothesisSteps
 from pop_core.fitting.initialisation import initial_parameters
 from pop_core.fitting.levenberg_marquardt import assemble, cost_of
 from pop_core.fitting.limb_exchange import Judge, exchange_limbs
+from pop_core.fitting.limb_proposals import LimbProposals
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.priors import neighbour_sigma_rad
 from pop_core.fitting.readings import best_facing, best_reading
@@ -27,6 +28,7 @@ from pop_core.segmentation.body_segmentation import SegmentationConfig
 # The robust kernel shrinks as the body settles [m].
 EARLY_SCALES_M = (WIDEST_M, 0.13, 0.11, 0.09)
 LATE_SCALES_M = (0.08, 0.06, 0.045, 0.035, 0.03)
+SEARCHED_SCALES_M = (0.12, *LATE_SCALES_M)  # a limb that was found is a few centimetres off
 TURNED_SCHEDULE = ((EARLY_SCALES_M[-2:], False), (LATE_SCALES_M, True))
 
 
@@ -71,13 +73,14 @@ class BodyFitter:
         self.steps = HypothesisSteps(model, self.config, segmentation or SegmentationConfig())
         self.coarse = FitBody(model, full=False)
         self.full = FitBody(model, full=True)
+        self.limbs = LimbProposals(prior)
 
     def fit(self, observation: Observation, candidates: Sequence[PoseCandidate]) -> BodyFit:
         """Return the body that explains an observation best, started from retrieved poses.
 
         All candidates are fitted to the joints (step 5), the better ones to the surface (steps 6
         and 7), the best of those, with limbs of the others where they serve better, to the end
-        with the free space (step 8).
+        with the free space (step 8). Limbs that still explain little are looked for anew.
         """
         started = [self._start(candidate, candidates) for candidate in candidates]
         for hypothesis in started:
@@ -94,6 +97,8 @@ class BodyFitter:
             hypotheses = [best_reading(each, observation, judge) for each in hypotheses]
         for hypothesis in hypotheses:
             self.steps.fit_surface(hypothesis, observation, LATE_SCALES_M, free_space=True)
+        for _ in range(self.config.limb_searches):
+            hypotheses = self._with_limbs_found(hypotheses, started, observation)
         self._judge(hypotheses, observation)(hypotheses)
         winner, *others = _best(hypotheses, len(hypotheses))
         named = observation
@@ -106,6 +111,26 @@ class BodyFitter:
         parameters = initial_parameters(self.model, candidate)
         belief = PriorBelief(self.prior, parameters.body_pose, neighbour_sigma_rad(all_of_them))
         return Hypothesis(self.coarse.state(parameters), belief)
+
+    def _with_limbs_found(
+        self, hypotheses: Sequence[Hypothesis], donors: Sequence[Hypothesis],
+        observation: Observation,
+    ) -> list[Hypothesis]:
+        """Return as many hypotheses, the better ones with and without limbs looked for anew."""
+        segment = self.steps.common_segment(hypotheses, observation)
+
+        def judge(judged: Sequence[Hypothesis]) -> None:
+            self.steps.score(judged, observation, segment)
+
+        judge(hypotheses)
+        found = []
+        for hypothesis in hypotheses:
+            better = self.limbs.improve(hypothesis, donors, observation, segment, judge)
+            if better is not hypothesis:
+                self.steps.fit_surface(better, observation, SEARCHED_SCALES_M, free_space=True)
+                found.append(better)
+        judge(found)
+        return _best([*hypotheses, *found], len(hypotheses))
 
     def _judge(self, hypotheses: Sequence[Hypothesis], observation: Observation) -> Judge:
         """Return what sets costs by E_depth over the pixels that most hypotheses agree on."""

@@ -24,6 +24,7 @@ CLOTHES_M = 0.03  # measured skin is cloth: it lies this far in front of the bod
 SMALL_GAP_M = 0.12  # up to here a body is pushed back along the ray, beyond it sideways
 FREE_SIGMA_M = 0.03
 DEPTH_SLICES = 5
+DEPTH_LIMIT_M = 0.15  # a pixel's error in E_depth counts up to here
 
 
 class Sight(IntEnum):
@@ -156,7 +157,7 @@ def depth_energy(
     rendered: RenderedDepth,
     observation: Observation,
     segment: Bool[np.ndarray, 'h w'],
-    limit_m: float = 0.15,
+    limit_m: float = DEPTH_LIMIT_M,
 ) -> float:
     """Return E_depth = |min(D_body, D_rest) - D_in|, truncated, per pixel of the segment.
 

@@ -17,6 +17,9 @@ class FittingConfig:
     final_hypotheses: int = setting(
         2, minimum=1, maximum=12,
         about='Hypotheses that are fitted to the end, best of E_depth first.')
+    limb_searches: int = setting(
+        2, minimum=0, maximum=10,
+        about='Times that limbs of the finalists are looked for beyond the retrieved poses.')
     surface_points: int = setting(
         700, minimum=50, maximum=20000,
         about='Most measured points that pull on the body in one step.')

@@ -140,9 +140,11 @@ class HypothesisSteps:
         """Return the pixels of a hypothesis (step 6) in the thinned window."""
         # Pixels of a thinned window are further apart, and so is the depth between them.
         gamma = self.segmentation.gamma_m * observation.window.stride
-        return segment_body(
+        near = segment_body(
             observation.depth_m, rendered, observation.own, observation.camera.fx,
             replace(self.segmentation, gamma_m=min(gamma, 0.2)))
+        # What was recognised as the person is to be explained, however far the body is from it.
+        return near | observation.recognised
 
     def surface_pairs(
         self,

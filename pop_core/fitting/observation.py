@@ -99,6 +99,13 @@ class Observation:
         z = self.depth_m[mask].astype(np.float64)
         return np.column_stack([self.rays[mask] * z[:, None], z])
 
+    @property
+    def recognised(self) -> Bool[np.ndarray, 'h w']:
+        """Return the pixels that the keypoint source itself calls this person's."""
+        if self.labels is None:
+            return np.zeros_like(self.own)
+        return self.own & (self.labels >= 0)
+
     def with_sides_exchanged(self) -> Observation:
         """Return the observation with everything that was called left called right."""
         rays, labels = self.keypoint_rays, self.labels

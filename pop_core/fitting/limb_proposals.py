@@ -1,0 +1,246 @@
+"""Arms and legs looked for where the measurements are, beyond the poses that were retrieved.
+
+When the trunk is found, a limb has few ways to be, and each can be priced without a mesh: by the
+keypoints it meets, by the unexplained surface along its bones, by the free space it would stand
+in. The cheapest of many limbs of the pose prior, none like another, then compete as whole bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from pop_core.body.joints import JOINT_INDEX, PARENTS, SHARED_INDEX
+from pop_core.fitting.depth_consistency import CLOTHES_M, DEPTH_LIMIT_M
+from pop_core.fitting.energy import TermWeights
+from pop_core.fitting.hypotheses import DEPTH_SCORE, Hypothesis
+from pop_core.fitting.limb_exchange import Judge
+from pop_core.fitting.observation import Observation
+from pop_core.fitting.residuals import RAY_SCALE_M
+from pop_core.fitting.robust_loss import geman_mcclure_share
+from pop_core.geometry.rotation import from_rotvec
+from pop_core.rendering.depth_renderer import render_depth
+from pop_core.retrieval.pose_prior import PosePrior
+
+SAMPLES, SEED = 1500, 0
+COMPETING = 4  # limbs that are judged as whole bodies
+APART_M = 0.10  # mean distance along the bones between limbs that are worth judging both
+HOPELESS = 3.0  # cost beyond the present limb's at which another need not be judged
+MARGIN = 2.0  # cost that another limb must save
+EXPLAINED_M = 0.06  # surface this near to the rest of the body needs no limb
+HAND = 1.6  # hands and feet end this far beyond their joints' rest distance
+
+
+@dataclass(frozen=True, slots=True)
+class LimbKind:
+    """An arm or leg: its joints from the first that turns to the end, and its thickness.
+
+    Args:
+        joints: Joint indices; all but the last turn.
+        keypoints: Shared joints at the second and third of them.
+        shares: Where points are taken along each bone.
+        radii_m: Of each bone.
+    """
+
+    joints: tuple[int, int, int, int]
+    keypoints: tuple[int, int]
+    shares: tuple[tuple[float, ...], ...]
+    radii_m: tuple[float, float, float]
+
+    @property
+    def rows(self) -> list[int]:
+        """Return the rows of the body pose that turn the limb."""
+        return [joint - 1 for joint in self.joints[:3]]
+
+
+def _kind(
+    side: str, names: tuple[str, str, str, str], shares: tuple[tuple[float, ...], ...],
+    radii_m: tuple[float, float, float],
+) -> LimbKind:
+    first, second, third, last = (JOINT_INDEX[f'{side}_{name}'] for name in names)
+    keypoints = (SHARED_INDEX[f'{side}_{names[1]}'], SHARED_INDEX[f'{side}_{names[2]}'])
+    return LimbKind((first, second, third, last), keypoints, shares, radii_m)
+
+
+ARM, LEG = ('shoulder', 'elbow', 'wrist', 'hand'), ('hip', 'knee', 'ankle', 'foot')
+# The first third of an upper bone is trunk.
+KINDS = (
+    *(_kind(side, ARM, ((0.4, 0.7, 1.0), (0.33, 0.67, 1.0), (0.5, 1.0)), (0.045, 0.04, 0.03))
+      for side in ('left', 'right')),
+    *(_kind(side, LEG, ((0.35, 0.6, 0.85), (0.1, 0.4, 0.7, 1.0), (0.5, 1.0)), (0.075, 0.05, 0.03))
+      for side in ('left', 'right')))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LimbPoints:
+    """Many ways of one limb to be, as points along its bones.
+
+    Args:
+        points: On the bones, camera frame [m].
+        ends: Second and third joint, camera frame [m].
+        width_m: Thickness of the limb at each point.
+        length_m: Length of the limb that each point stands for.
+    """
+
+    points: Float[np.ndarray, 'n p 3']
+    ends: Float[np.ndarray, 'n 2 3']
+    width_m: Float[np.ndarray, 'p']
+    length_m: Float[np.ndarray, 'p']
+
+
+class LimbProposals:
+    """Limbs of a pose prior that any hypothesis may take."""
+
+    def __init__(self, prior: PosePrior) -> None:
+        """Draw the limbs once."""
+        self.poses = prior.sample(np.random.default_rng(SEED), SAMPLES)
+
+    def improve(
+        self, hypothesis: Hypothesis, donors: Sequence[Hypothesis], observation: Observation,
+        segment: Bool[np.ndarray, 'h w'], judge: Judge,
+    ) -> Hypothesis:
+        """Return a hypothesis with limbs that explain what is seen better, or itself.
+
+        Args:
+            hypothesis: Its cost is known.
+            donors: Other hypotheses, whose limbs compete too.
+            observation: What the sensor says.
+            segment: Pixels of the person.
+            judge: Sets the cost of hypotheses.
+        """
+        theirs = [donor.state.parameters.body_pose[None] for donor in donors]
+        poses = np.concatenate([*theirs, self.poses])
+        for kind in KINDS:
+            trials = [_with_limb(hypothesis, kind, pose)
+                      for pose in _competing(hypothesis, kind, poses, observation, segment)]
+            judge(trials)
+            cheapest = min(trials, key=lambda trial: trial.cost, default=hypothesis)
+            if cheapest.cost < hypothesis.cost - MARGIN:
+                hypothesis = cheapest
+        return hypothesis
+
+
+def _competing(
+    hypothesis: Hypothesis, kind: LimbKind, poses: Float[np.ndarray, 'n 23 3'],
+    observation: Observation, segment: Bool[np.ndarray, 'h w'],
+) -> Float[np.ndarray, 'k 3 3']:
+    """Return the rotations of the cheapest limbs, none like another [rad], cheapest first."""
+    limbs = poses[:, kind.rows]
+    present = hypothesis.state.parameters.body_pose[None, kind.rows]
+    ways = _points(hypothesis, kind, np.concatenate([limbs, present]))
+    unexplained = segment & ~_explained_by_the_rest(hypothesis, kind, observation)
+    cost = _keypoint_cost(ways, kind, observation) + _depth_cost(
+        ways, observation, unexplained, max(int(segment.sum()), 1))
+    chosen: list[int] = []
+    for i in np.argsort(cost[:-1]):
+        if len(chosen) == COMPETING or cost[i] > cost[-1] + HOPELESS:
+            break
+        apart_m = np.linalg.norm(ways.points[chosen] - ways.points[i], axis=-1).mean(axis=-1)
+        if (apart_m > APART_M).all():
+            chosen.append(int(i))
+    return limbs[chosen]
+
+
+def _points(
+    hypothesis: Hypothesis, kind: LimbKind, limbs: Float[np.ndarray, 'n 3 3']
+) -> LimbPoints:
+    """Return where a hypothesis would have a limb, for many rotations of it [rad]."""
+    state = hypothesis.state
+    skeleton, scale = state.skeleton, state.parameters.scale
+    R = from_rotvec(limbs.reshape(-1, 3)).reshape(len(limbs), 3, 3, 3)
+    turned = np.broadcast_to(skeleton.G[PARENTS[kind.joints[0]]], R[:, 0].shape)
+    start = np.broadcast_to(state.joints[kind.joints[0]], (len(limbs), 3))
+    points, ends, widths, lengths = [], [], [], []
+    for k, (shares, radius_m) in enumerate(zip(kind.shares, kind.radii_m, strict=True)):
+        here, there = kind.joints[k: k + 2]
+        bone = scale * (skeleton.rest_joints[there] - skeleton.rest_joints[here])
+        bone = bone * (HAND if k == 2 else 1.0)
+        turned = turned @ R[:, k]
+        end = start + turned @ bone
+        points += [start + share * (end - start) for share in shares]
+        widths += [2.0 * scale * radius_m] * len(shares)
+        lengths += [float(np.linalg.norm(bone)) / len(shares)] * len(shares)
+        ends.append(end)
+        start = end
+    return LimbPoints(
+        np.stack(points, axis=1), np.stack(ends[:2], axis=1), np.array(widths),
+        np.array(lengths))
+
+
+def _explained_by_the_rest(
+    hypothesis: Hypothesis, kind: LimbKind, observation: Observation
+) -> Bool[np.ndarray, 'h w']:
+    """Return the pixels whose surface the body without a limb explains."""
+    state = hypothesis.state
+    faces = state.body.faces
+    of_limb = np.isin(state.body.main_bone, kind.joints)[faces].any(axis=1)
+    rest = render_depth(state.vertices, faces[~of_limb], observation.camera).depth_m
+    with np.errstate(invalid='ignore'):
+        return np.abs(rest - observation.depth_m) < EXPLAINED_M
+
+
+def _keypoint_cost(
+    ways: LimbPoints, kind: LimbKind, observation: Observation
+) -> Float[np.ndarray, 'n']:
+    """Return what the limb's keypoints cost, as in E_J3D."""
+    lifted, rays = observation.lifted, observation.keypoint_rays
+    cost = np.zeros(len(ways.ends))
+    for k, joint in enumerate(kind.keypoints):
+        end = ways.ends[:, k]
+        if lifted.lifted[joint]:
+            distance = np.linalg.norm(end - lifted.positions_camera[joint], axis=1)
+            cost += _robust(distance, lifted.sigma_m[joint], TermWeights().robust_m)
+        for row in np.flatnonzero(rays.joint == joint):
+            distance = np.linalg.norm(end @ rays.across[row].T, axis=1)
+            sigma_m = rays.sigma * np.maximum(end[:, 2], 0.3)
+            cost += rays.score[row] * _robust(distance, sigma_m, RAY_SCALE_M)
+    return cost
+
+
+def _robust(
+    distance: Float[np.ndarray, 'n'], sigma_m: float | Float[np.ndarray, 'n'], scale_m: float
+) -> Float[np.ndarray, 'n']:
+    return 0.5 * (distance / sigma_m) ** 2 * geman_mcclure_share(distance, scale_m)
+
+
+def _depth_cost(
+    ways: LimbPoints, observation: Observation, unexplained: Bool[np.ndarray, 'h w'],
+    segment_px: int,
+) -> Float[np.ndarray, 'n']:
+    """Return what E_depth would say of the pixels along the bones, roughly.
+
+    A point before the measured surface costs its gap, one on surface that nothing else explains
+    saves what is unexplained, one that is hidden costs nothing; below the floor nothing hides.
+    """
+    n, p = ways.points.shape[:2]
+    flat = ways.points.reshape(-1, 3)
+    measured, uv = observation.depth_at(flat)
+    gap = (measured - flat[:, 2]).reshape(n, p) + ways.width_m / 2
+    known = np.isfinite(gap)
+    gap = np.where(known, gap, 0.0)
+    depth = np.maximum(ways.points[..., 2], 0.3)
+    margin = CLOTHES_M + 0.01 + 2 * observation.noise.sigma_m(depth)
+    wrong = np.clip((gap - margin) / DEPTH_LIMIT_M, 0.0, 1.0)
+    if observation.ground is not None:
+        below = -observation.ground.height(flat).reshape(n, p)
+        wrong += np.clip((below - 0.02) / DEPTH_LIMIT_M, 0.0, 1.0)
+    u, v = np.clip(uv, 0, np.array(unexplained.shape[::-1]) - 1).T.reshape(2, n, p)
+    met = np.clip(1.0 - np.abs(gap) / (margin + CLOTHES_M), 0.0, 1.0)
+    right = np.where(known & unexplained[v, u], met, 0.0)
+    area_px = ways.length_m * ways.width_m * (observation.camera.fx / depth) ** 2
+    price = DEPTH_SCORE * DEPTH_LIMIT_M * area_px / segment_px
+    return np.asarray((price * (wrong - right)).sum(axis=1))
+
+
+def _with_limb(
+    hypothesis: Hypothesis, kind: LimbKind, limb: Float[np.ndarray, '3 3']
+) -> Hypothesis:
+    parameters = hypothesis.state.parameters
+    pose, expected = parameters.body_pose.copy(), hypothesis.belief.pose.copy()
+    pose[kind.rows], expected[kind.rows] = limb, limb
+    return replace(
+        hypothesis, state=hypothesis.state.body.state(parameters.replaced(body_pose=pose)),
+        belief=replace(hypothesis.belief, pose=expected))
