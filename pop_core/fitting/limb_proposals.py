@@ -8,20 +8,19 @@ in. The cheapest of many limbs of the pose prior, none like another, then compet
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pop_core.body.joints import JOINT_INDEX, PARENTS, SHARED_INDEX
 from pop_core.fitting.depth_consistency import CLOTHES_M, DEPTH_LIMIT_M
 from pop_core.fitting.energy import TermWeights
 from pop_core.fitting.hypotheses import DEPTH_SCORE, Hypothesis
 from pop_core.fitting.limb_exchange import Judge
+from pop_core.fitting.limb_points import KINDS, LimbKind, LimbPoints, limb_points
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import RAY_SCALE_M
 from pop_core.fitting.robust_loss import geman_mcclure_share
-from pop_core.geometry.rotation import from_rotvec
 from pop_core.rendering.depth_renderer import render_depth
 from pop_core.retrieval.pose_prior import PosePrior
 
@@ -31,64 +30,6 @@ APART_M = 0.10  # mean distance along the bones between limbs that are worth jud
 HOPELESS = 3.0  # cost beyond the present limb's at which another need not be judged
 MARGIN = 2.0  # cost that another limb must save
 EXPLAINED_M = 0.06  # surface this near to the rest of the body needs no limb
-HAND = 1.6  # hands and feet end this far beyond their joints' rest distance
-
-
-@dataclass(frozen=True, slots=True)
-class LimbKind:
-    """An arm or leg: its joints from the first that turns to the end, and its thickness.
-
-    Args:
-        joints: Joint indices; all but the last turn.
-        keypoints: Shared joints at the second and third of them.
-        shares: Where points are taken along each bone.
-        radii_m: Of each bone.
-    """
-
-    joints: tuple[int, int, int, int]
-    keypoints: tuple[int, int]
-    shares: tuple[tuple[float, ...], ...]
-    radii_m: tuple[float, float, float]
-
-    @property
-    def rows(self) -> list[int]:
-        """Return the rows of the body pose that turn the limb."""
-        return [joint - 1 for joint in self.joints[:3]]
-
-
-def _kind(
-    side: str, names: tuple[str, str, str, str], shares: tuple[tuple[float, ...], ...],
-    radii_m: tuple[float, float, float],
-) -> LimbKind:
-    first, second, third, last = (JOINT_INDEX[f'{side}_{name}'] for name in names)
-    keypoints = (SHARED_INDEX[f'{side}_{names[1]}'], SHARED_INDEX[f'{side}_{names[2]}'])
-    return LimbKind((first, second, third, last), keypoints, shares, radii_m)
-
-
-ARM, LEG = ('shoulder', 'elbow', 'wrist', 'hand'), ('hip', 'knee', 'ankle', 'foot')
-# The first third of an upper bone is trunk.
-KINDS = (
-    *(_kind(side, ARM, ((0.4, 0.7, 1.0), (0.33, 0.67, 1.0), (0.5, 1.0)), (0.045, 0.04, 0.03))
-      for side in ('left', 'right')),
-    *(_kind(side, LEG, ((0.35, 0.6, 0.85), (0.1, 0.4, 0.7, 1.0), (0.5, 1.0)), (0.075, 0.05, 0.03))
-      for side in ('left', 'right')))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LimbPoints:
-    """Many ways of one limb to be, as points along its bones.
-
-    Args:
-        points: On the bones, camera frame [m].
-        ends: Second and third joint, camera frame [m].
-        width_m: Thickness of the limb at each point.
-        length_m: Length of the limb that each point stands for.
-    """
-
-    points: Float[np.ndarray, 'n p 3']
-    ends: Float[np.ndarray, 'n 2 3']
-    width_m: Float[np.ndarray, 'p']
-    length_m: Float[np.ndarray, 'p']
 
 
 class LimbProposals:
@@ -130,7 +71,7 @@ def _competing(
     """Return the rotations of the cheapest limbs, none like another [rad], cheapest first."""
     limbs = poses[:, kind.rows]
     present = hypothesis.state.parameters.body_pose[None, kind.rows]
-    ways = _points(hypothesis, kind, np.concatenate([limbs, present]))
+    ways = limb_points(hypothesis.state, kind, np.concatenate([limbs, present]))
     unexplained = segment & ~_explained_by_the_rest(hypothesis, kind, observation)
     cost = _keypoint_cost(ways, kind, observation) + _depth_cost(
         ways, observation, unexplained, max(int(segment.sum()), 1))
@@ -142,32 +83,6 @@ def _competing(
         if (apart_m > APART_M).all():
             chosen.append(int(i))
     return limbs[chosen]
-
-
-def _points(
-    hypothesis: Hypothesis, kind: LimbKind, limbs: Float[np.ndarray, 'n 3 3']
-) -> LimbPoints:
-    """Return where a hypothesis would have a limb, for many rotations of it [rad]."""
-    state = hypothesis.state
-    skeleton, scale = state.skeleton, state.parameters.scale
-    R = from_rotvec(limbs.reshape(-1, 3)).reshape(len(limbs), 3, 3, 3)
-    turned = np.broadcast_to(skeleton.G[PARENTS[kind.joints[0]]], R[:, 0].shape)
-    start = np.broadcast_to(state.joints[kind.joints[0]], (len(limbs), 3))
-    points, ends, widths, lengths = [], [], [], []
-    for k, (shares, radius_m) in enumerate(zip(kind.shares, kind.radii_m, strict=True)):
-        here, there = kind.joints[k: k + 2]
-        bone = scale * (skeleton.rest_joints[there] - skeleton.rest_joints[here])
-        bone = bone * (HAND if k == 2 else 1.0)
-        turned = turned @ R[:, k]
-        end = start + turned @ bone
-        points += [start + share * (end - start) for share in shares]
-        widths += [2.0 * scale * radius_m] * len(shares)
-        lengths += [float(np.linalg.norm(bone)) / len(shares)] * len(shares)
-        ends.append(end)
-        start = end
-    return LimbPoints(
-        np.stack(points, axis=1), np.stack(ends[:2], axis=1), np.array(widths),
-        np.array(lengths))
 
 
 def _explained_by_the_rest(

@@ -12,7 +12,8 @@ from pop_core.fitting.body_state import FitBody
 from pop_core.fitting.energy import PriorBelief
 from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.fitting.hypotheses import Hypothesis, HypothesisSteps
-from pop_core.fitting.limb_proposals import KINDS, LimbProposals, _points
+from pop_core.fitting.limb_points import KINDS, limb_points
+from pop_core.fitting.limb_proposals import LimbProposals
 from pop_core.fitting.observation import Observation, observe
 from pop_core.keypoints.lifted_joints import LiftedJoints, LiftState
 from pop_core.retrieval.pose_prior import load_pose_prior
@@ -96,7 +97,7 @@ def test_points_lie_on_the_bones_of_the_posed_body(
     body: BodyModel, person: BodyParameters, kind: object
 ) -> None:
     start = hypothesis(body, person, person.body_pose)
-    ways = _points(start, kind, person.body_pose[None, kind.rows])
+    ways = limb_points(start.state, kind, person.body_pose[None, kind.rows])
     np.testing.assert_allclose(ways.ends[0], start.state.joints[list(kind.joints[1:3])])
     assert ways.points.shape[1] == len(ways.width_m) == len(ways.length_m)
 
