@@ -98,7 +98,10 @@ class BodyFitter:
         for hypothesis in hypotheses:
             self.steps.fit_surface(hypothesis, observation, LATE_SCALES_M, free_space=True)
         for _ in range(self.config.limb_searches):
-            hypotheses = self._with_limbs_found(hypotheses, started, observation)
+            before, hypotheses = hypotheses, self._with_limbs_found(
+                hypotheses, started, observation)
+            if hypotheses == before:
+                break
         self._judge(hypotheses, observation)(hypotheses)
         winner, *others = _best(hypotheses, len(hypotheses))
         named = observation
@@ -130,7 +133,7 @@ class BodyFitter:
                 self.steps.fit_surface(better, observation, SEARCHED_SCALES_M, free_space=True)
                 found.append(better)
         judge(found)
-        return _best([*hypotheses, *found], len(hypotheses))
+        return _best([*hypotheses, *found], len(hypotheses)) if found else list(hypotheses)
 
     def _judge(self, hypotheses: Sequence[Hypothesis], observation: Observation) -> Judge:
         """Return what sets costs by E_depth over the pixels that most hypotheses agree on."""

@@ -24,7 +24,7 @@ class FittingConfig:
         700, minimum=50, maximum=20000,
         about='Most measured points that pull on the body in one step.')
     polish_steps: int = setting(
-        1, minimum=0, maximum=20,
+        3, minimum=0, maximum=20,
         about='Steps of the winner on the full mesh.')
     prior_weight: float = setting(
         0.15, minimum=0.0, maximum=100.0,

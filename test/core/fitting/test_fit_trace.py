@@ -15,6 +15,7 @@ from pop_core.fitting.fit_trace import (
     TracedStep,
     TracedSteps,
 )
+from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.fitting.observation import observe
 from pop_core.geometry.rotation import from_rotvec
 from pop_core.retrieval.candidate import PoseCandidate
@@ -68,7 +69,7 @@ def test_every_hypothesis_is_seen_and_the_winner_to_the_end(
     assert {step.hypothesis for step in steps} == {0, 1, 2}
     winner = [step.stage for step in steps if step.hypothesis == steps[-1].hypothesis]
     assert list(dict.fromkeys(winner)) == [JOINTS, SURFACE, FREE_SPACE, POLISH]
-    assert sum(step.stage == POLISH for step in steps) == 1
+    assert sum(step.stage == POLISH for step in steps) == FittingConfig().polish_steps
 
 
 def test_the_depth_energy_of_a_fit_in_full_view_falls_to_a_fraction(
