@@ -11,6 +11,8 @@ import os
 import pickle
 import subprocess
 import sys
+import threading
+import time
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any, BinaryIO
@@ -26,10 +28,15 @@ from pop_core.tracking.finder import FoundPerson, find_person
 from pop_ros.sources import make_pipeline
 
 NICENESS = 5  # where processors are scarce those who are followed go first
+# Without caches the first answer takes minutes, any other a part of a second.
+FIRST_PATIENCE_S, PATIENCE_S = 600.0, 30.0
+# Not `-m`, which would look for modules in the working directory before all others.
+PROGRAM = ('import sys; sys.path[:] = sys.argv[1:]; '
+           'from pop_ros.finding_process import main; main()')
 
 
 class FindingError(PopError):
-    """The process that fits people ended."""
+    """The process that fits people ended, or is none to be had."""
 
 
 class FindingProcess:
@@ -39,6 +46,9 @@ class FindingProcess:
         """Start nothing yet."""
         self._config = PipelineConfig()
         self._process: subprocess.Popen[bytes] | None = None
+        self._has_answered = self._is_stopped = False
+        # So that no process is started while another thread stops the last one.
+        self._lock = threading.Lock()
         # A thread waits for the answers, and asks in order.
         self._waiting = ThreadPoolExecutor(1, 'pop finding people')
 
@@ -57,35 +67,58 @@ class FindingProcess:
     def stop(self) -> None:
         """End the process, whatever it does."""
         self._waiting.shutdown(wait=False, cancel_futures=True)
-        if self._process is not None:
-            self._process.kill()
-            self._process.wait()
+        with self._lock:
+            self._is_stopped = True
+            if self._process is not None:
+                self._process.kill()
+                self._process.wait()
 
     def _answer(self, job: Any) -> Any:
-        if self._process is None or self._process.poll() is not None:
-            self._process = _started()
-        child = self._process
-        assert child.stdin is not None
-        assert child.stdout is not None
-        try:
-            pickle.dump(job, child.stdin, protocol=pickle.HIGHEST_PROTOCOL)
-            child.stdin.flush()
-            answer = pickle.load(child.stdout)
-        except (EOFError, OSError) as error:
-            raise FindingError(
-                f'the process that fits people ended with code {child.wait()}; the next person '
-                'starts another') from error
+        data = pickle.dumps(job, protocol=pickle.HIGHEST_PROTOCOL)
+        answer = self._exchange(self._child(), data)
+        self._has_answered = True
         if isinstance(answer, Exception):
             raise answer
         return answer
 
+    def _child(self) -> subprocess.Popen[bytes]:
+        with self._lock:
+            if self._is_stopped:
+                raise FindingError('the process that fits people was stopped')
+            if self._process is None or self._process.poll() is not None:
+                self._process, self._has_answered = _started(), False
+            return self._process
+
+    def _exchange(self, child: subprocess.Popen[bytes], data: bytes) -> Any:
+        assert child.stdin is not None
+        assert child.stdout is not None
+        asked_s = time.monotonic()
+        watchdog = threading.Timer(
+            PATIENCE_S if self._has_answered else FIRST_PATIENCE_S, child.kill)
+        watchdog.daemon = True
+        watchdog.start()
+        try:
+            child.stdin.write(data)
+            child.stdin.flush()
+            return pickle.load(child.stdout)
+        except Exception as error:
+            child.kill()  # what it says next would be taken for another answer
+            raise FindingError(
+                f'the process that fits people ended with code {child.wait()} after '
+                f'{time.monotonic() - asked_s:.1f} s; the next person starts another') from error
+        finally:
+            watchdog.cancel()
+
 
 def _started() -> subprocess.Popen[bytes]:
-    paths = os.pathsep.join(path for path in sys.path if path)
     # In a session of its own: Ctrl-C in a terminal is for the node to answer.
-    return subprocess.Popen(
-        [sys.executable, '-m', 'pop_ros.finding_process'], stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE, env={**os.environ, 'PYTHONPATH': paths}, start_new_session=True)
+    try:
+        return subprocess.Popen(
+            [sys.executable, '-c', PROGRAM, *sys.path], stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE, start_new_session=True)
+    except OSError as error:
+        raise FindingError(
+            f'expected a second process to fit people in, found none: {error}') from error
 
 
 class Nobody:
@@ -139,7 +172,3 @@ def main() -> None:
     with os.fdopen(os.dup(1), 'wb') as answers:
         os.dup2(2, 1)
         answer_jobs(sys.stdin.buffer, answers)
-
-
-if __name__ == '__main__':
-    main()

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,6 +22,7 @@ from pop_core.estimate import EstimateStatus
 from pop_core.keypoints.detection import Detection
 from pop_core.pipeline import Scene
 from pop_core.tracking.finder import find_person
+from pop_ros import finding_process
 from pop_ros.finding_process import FindingError, FindingProcess
 
 WAIT_S = 120.0
@@ -80,6 +82,69 @@ def test_an_error_there_is_an_error_here_and_a_dead_process_is_replaced(
     os.kill(child_of(finding), signal.SIGKILL)
     with pytest.raises(FindingError, match='ended with code -9'):
         waiting.result(WAIT_S)
+    assert finding.submit(*seen).result(WAIT_S).status is EstimateStatus.OK
+
+
+def test_a_process_that_hangs_is_ended_and_replaced(
+    finding: FindingProcess, seen: tuple[Scene, Detection], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    finding.submit(*seen).result(WAIT_S)
+    hung = child_of(finding)
+    monkeypatch.setattr(finding_process, 'PATIENCE_S', 0.5)
+    os.kill(hung, signal.SIGSTOP)
+    with pytest.raises(FindingError, match='ended with code -9 after 0'):
+        finding.submit(*seen).result(WAIT_S)
+    assert not is_running(hung)
+    # The first answer of its successor may take as long as loading does.
+    assert finding.submit(*seen).result(WAIT_S).status is EstimateStatus.OK
+
+
+def test_half_an_answer_is_not_taken_for_a_part_of_the_next(
+    finding: FindingProcess, seen: tuple[Scene, Detection], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(finding_process, 'PROGRAM', (
+        'import pickle, sys; d = pickle.dumps([0] * 9); sys.stdout.buffer.write(d[:-5]); '
+        'sys.stdout.flush(); sys.stdin.buffer.read(1)'))
+    with pytest.raises(FindingError):
+        finding.submit(*seen).result(WAIT_S)
+    monkeypatch.undo()
+    assert finding.submit(*seen).result(WAIT_S).status is EstimateStatus.OK
+
+
+def test_where_no_process_can_be_started_it_is_said(
+    finding: FindingProcess, seen: tuple[Scene, Detection], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, 'executable', '/nowhere/python')
+    finding.start()
+    with pytest.raises(FindingError, match=r'found none: .*nowhere'):
+        finding.submit(*seen).result(WAIT_S)
+
+
+def test_stopping_while_a_dead_process_is_replaced_leaves_none(
+    finding: FindingProcess, seen: tuple[Scene, Detection], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replacing, started = threading.Event(), finding_process._started
+
+    def slowly_started() -> subprocess.Popen[bytes]:
+        replacing.set()
+        time.sleep(0.3)
+        return started()
+
+    monkeypatch.setattr(finding_process, '_started', slowly_started)
+    waiting = finding.submit(*seen)
+    assert replacing.wait(WAIT_S)
+    finding.stop()
+    with pytest.raises(FindingError):
+        waiting.result(WAIT_S)
+    assert not is_running(child_of(finding))
+
+
+def test_modules_of_the_working_directory_are_not_taken_for_those_of_the_node(
+    finding: FindingProcess, seen: tuple[Scene, Detection], tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (tmp_path / 'pickle.py').write_text('raise SystemExit(3)')
+    monkeypatch.chdir(tmp_path)
     assert finding.submit(*seen).result(WAIT_S).status is EstimateStatus.OK
 
 
