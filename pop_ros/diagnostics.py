@@ -16,6 +16,7 @@ from pop_ros.pairing import FramePairer
 from pop_ros.statistics import Snapshot
 
 DROP_PREFIX = 'dropped: '
+UNFITTED_PREFIX = 'not fitted: '
 RECEIVED = 'received '
 MISSED = 'colour images without depth'
 WHY_MISSED = 'why without depth'
@@ -137,6 +138,8 @@ def _values(report: Report) -> Iterator[tuple[str, str]]:
     yield 'rate', f'{report.rate_hz:.1f} Hz'
     yield 'pending', str(now.pending)
     yield 'people', str(now.people)
+    for reason, count in sorted(now.unfitted.items()):
+        yield f'{UNFITTED_PREFIX}{reason}', str(count)
     yield MISSED, str(pairs.missed)
     if pairs.missed:
         yield WHY_MISSED, explain_refused_pairs(report.pairer)

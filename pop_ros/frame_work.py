@@ -143,7 +143,8 @@ class FrameWork:
         latency_ms = (time.monotonic() - messages.arrival_s) * 1e3
         age_ms = (self._clock.now().nanoseconds - stamp_ns(messages.color.header)) / 1e6
         result = fitted.result
-        self._statistics.add_frame(len(result.bodies), latency_ms, age_ms, result.times_ms)
+        self._statistics.add_frame(
+            len(result.bodies), latency_ms, age_ms, result.times_ms, result.statuses)
 
     def _clear(self) -> None:
         if self._fitter is not None:

@@ -6,10 +6,12 @@ import re
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+
+from pop_core.estimate import EstimateStatus
 
 REMINDER_S = 5.0  # how often the same drop is said again
 WINDOW = 100  # latest frames that rates and percentiles are taken from
@@ -31,6 +33,7 @@ class Snapshot:
         frames: Frames fitted.
         people: People fitted in all frames.
         latest_people: People in the latest frame.
+        unfitted: People who were detected and gave no body, in all frames, by reason.
         drops: Pairs that gave no frame, by reason.
         refused: Pairs dropped because something was wrong with them.
         faults: Those of them that met a fault of the node itself.
@@ -45,6 +48,7 @@ class Snapshot:
     frames: int
     people: int
     latest_people: int
+    unfitted: Mapping[str, int]
     drops: Mapping[str, int]
     refused: int
     faults: int
@@ -71,6 +75,7 @@ class NodeStatistics:
     faults: int = 0
     latest_drop: str = ''
     drops: Counter[str] = field(default_factory=Counter)
+    unfitted: Counter[str] = field(default_factory=Counter)
     _latency_ms: deque[float] = field(default_factory=lambda: deque(maxlen=WINDOW))
     _age_ms: deque[float] = field(default_factory=lambda: deque(maxlen=WINDOW))
     _step_ms: dict[str, deque[float]] = field(default_factory=dict)
@@ -83,13 +88,17 @@ class NodeStatistics:
             self.pairs += 1
 
     def add_frame(
-        self, people: int, latency_ms: float, age_ms: float, step_ms: Mapping[str, float]
+        self, people: int, latency_ms: float, age_ms: float, step_ms: Mapping[str, float],
+        statuses: Sequence[EstimateStatus] = (),
     ) -> None:
-        """Count a fitted frame and its times [ms]."""
+        """Count a fitted frame, its times [ms], and what became of who was detected."""
         with self._lock:
             self.frames += 1
             self.people += people
             self.latest_people = people
+            self.unfitted.update(
+                status.value for status in statuses
+                if status not in (EstimateStatus.OK, EstimateStatus.WAITING))
             self._latency_ms.append(latency_ms)
             self._age_ms.append(age_ms)
             for name, value in step_ms.items():
@@ -125,6 +134,6 @@ class NodeStatistics:
         with self._lock:
             return Snapshot(
                 time.monotonic(), self.pairs, self.frames, self.people, self.latest_people,
-                dict(self.drops), self.refused, self.faults, self.latest_drop,
+                dict(self.unfitted), dict(self.drops), self.refused, self.faults, self.latest_drop,
                 tuple(self._latency_ms), tuple(self._age_ms),
                 {name: tuple(values) for name, values in self._step_ms.items()})

@@ -63,6 +63,7 @@ class FreshFits:
         """Have fits made meanwhile; None makes each while it is asked for."""
         self._background = background
         self._asked: Asked | None = None
+        self._has_failed = False
 
     @property
     def is_busy(self) -> bool:
@@ -82,6 +83,8 @@ class FreshFits:
     ) -> None:
         """Have a person fitted, unless another fit is being made.
 
+        After a fit that an error ended the next one is made here: nobody is lost for want of help.
+
         Args:
             pipeline: Makes the fit where it is waited for.
             scene: The frame.
@@ -92,7 +95,8 @@ class FreshFits:
         if self.is_busy:
             return
         stamp_ns = scene.frame.stamp_ns
-        if wait or self._background is None:
+        if wait or self._background is None or self._has_failed:
+            self._has_failed = False
             future: Future[FoundPerson] = Future()
             future.set_result(find_person(pipeline, scene, detection))
             self._asked = Asked(track, stamp_ns, future, is_ready=True)
@@ -109,6 +113,7 @@ class FreshFits:
         if asked is None or asked.track != track or not asked.is_ready:
             return None
         self._asked = None
+        self._has_failed = asked.future.exception() is not None
         return FreshFit(asked.future.result(), asked.stamp_ns)
 
     def forget_unless(self, tracks: Collection[int]) -> None:

@@ -48,6 +48,7 @@ class BodyTracker:
         self._last: tuple[Camera, int] | None = None
         self._ground: Ground | None = None
         self._noise = USUAL_NOISE
+        self._refused: EstimateStatus | None = None
         self.configure(pipeline, config or TrackingConfig())
 
     def configure(self, pipeline: BodyPipeline, config: TrackingConfig) -> None:
@@ -83,8 +84,9 @@ class BodyTracker:
             seen = undistort_frame(frame)
         is_late = self._fresh.poll() or (
             self._gap.is_long and any(track.has_just_begun for track in self._tracks))
-        if (fresh := self._fresh.take(None)) is not None:
-            self._welcome(fresh)
+        fresh = self._fresh.take(None)
+        has_failed = fresh is not None and self._welcome(fresh) is None
+        self._refused = fresh.person.status if fresh is not None and has_failed else None
         with self._blas.limit(limits=1, user_api='blas'):
             found = self._look(frame, seen, watch, is_late=is_late)
             bodies, statuses = self._track(seen, found, watch)
@@ -213,7 +215,9 @@ class BodyTracker:
             self._ask(scene, found, index)
         fresh = self._fresh.take(None)
         if fresh is None:
-            return EstimateStatus.WAITING, None
+            # Who was fitted in vain is the nearest again, and is told why.
+            status, self._refused = self._refused or EstimateStatus.WAITING, None
+            return status, None
         track = self._welcome(fresh)
         if track is None or fresh.person.estimate is None:
             return fresh.person.status, None

@@ -4,6 +4,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from pop_core.errors import PopError
+from pop_core.estimate import EstimateStatus
 from pop_ros.diagnostics import Report, diagnostic_array, percentiles, read_values
 from pop_ros.explanation import TopicReport
 from pop_ros.message_error import BadMessageError
@@ -72,6 +73,16 @@ def test_a_healthy_node_reports_every_count_and_time() -> None:
     assert values['received color/image'] == '9'
     assert status(fitted(), doing='loading')[:2] == (DiagnosticStatus.OK, 'preparing: loading')
     assert 'idle' in status(fitted(), state='inactive', waits=False)[1]
+
+
+def test_who_was_seen_and_not_fitted_is_counted_with_the_reason() -> None:
+    statistics = fitted()
+    for status_there in (EstimateStatus.OK, EstimateStatus.WAITING, EstimateStatus.TOO_FAR):
+        statistics.add_frame(0, 1.0, 1.0, {}, [status_there, EstimateStatus.NO_SKELETON])
+    _, _, values = status(statistics)
+    assert {key: value for key, value in values.items() if key.startswith('not fitted')} == {
+        f'not fitted: {EstimateStatus.TOO_FAR.value}': '1',
+        f'not fitted: {EstimateStatus.NO_SKELETON.value}': '3'}
 
 
 def test_pairs_with_faults_are_worth_a_warning_and_those_replaced_are_not() -> None:

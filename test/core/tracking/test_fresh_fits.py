@@ -13,7 +13,7 @@ from pop_core.estimate import EstimateStatus, TrackState
 from pop_core.keypoints.detection import Detection
 from pop_core.pipeline import Scene
 from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, Gap
-from pop_core.tracking.finder import find_person
+from pop_core.tracking.finder import FoundPerson, find_person
 from pop_core.tracking.fresh_fits import FreshFits
 from pop_core.tracking.track import PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
@@ -151,6 +151,34 @@ def test_an_error_of_a_late_fit_is_raised_once(
     with pytest.raises(MemoryError):
         fits.take(None)
     assert not fits.is_busy
+
+
+def test_who_is_lost_to_an_error_is_found_without_help(
+    stage: Stage, late: Late, person: BodyParameters
+) -> None:
+    stage.show(person, times=5)
+    here = newcomer(person, 0)
+    stage.show(person, here, times=3)
+    late.fail()
+    with pytest.raises(MemoryError):
+        stage.show(person, here)
+    assert len(stage.show(person, here, times=3)) == 2
+    assert late.asked == 1
+
+
+def test_who_was_fitted_in_vain_is_told_why(
+    stage: Stage, late: Late, person: BodyParameters
+) -> None:
+    stage.show(person, times=5)
+    here = newcomer(person, 0)
+    stage.show(person, here, times=3)
+    (future, _, _), = late.waiting
+    late.waiting.clear()
+    future.set_result(FoundPerson(EstimateStatus.NO_SUPPORT))
+    stage.show(person, here)
+    assert sorted(status.name for status in stage.statuses) == ['NO_SUPPORT', 'OK']
+    stage.show(person, here, times=3)
+    assert EstimateStatus.NO_SUPPORT not in stage.statuses
 
 
 def test_a_fit_is_ready_for_whole_frames_only_and_for_its_owner_only(
