@@ -59,6 +59,12 @@ def change(player: Player, transition: str) -> bool:
     return bool(player.call(ChangeState, 'change_state', request).success)
 
 
+def children(running: RunningNode) -> set[str]:
+    """Return the numbers of the processes that the node has started."""
+    tasks = Path(f'/proc/{running.process.pid}/task').glob('*/children')
+    return {number for task in tasks for number in task.read_text().split()}
+
+
 def fit_one(player: Player, recording: Recording) -> None:
     """Play the frame until its person comes back."""
     assert player.spin_until(player.is_heard)
@@ -90,14 +96,17 @@ def test_a_manager_takes_the_node_through_its_life(
         assert player.spin_until(lambda: not player.is_heard())
         assert player.spin_until(lambda: player.received['mesh'][-1].action == Marker.DELETE)
         assert player.spin_until(lambda: not player.received['joints'][-1].poses)
+        assert player.spin_until(lambda: children(running))
         assert change(player, 'cleanup')
         assert state(player) == 'unconfigured'
+        assert not children(running)
         # A second life is like the first.
         assert change(player, 'configure')
         assert change(player, 'activate')
         fit_one(player, recording)
         assert change(player, 'shutdown')
         assert state(player) == 'finalized'
+        assert not children(running)
         assert player.spin_until(lambda: player.received['mesh'][-1].action == Marker.DELETE)
         assert player.spin_until(lambda: not player.is_heard())
     assert running.end(signal.SIGTERM) == 0, running.output
