@@ -7,6 +7,7 @@ single-threaded because rclpy's multi-threaded one spends a core on waiting.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.clock import Clock
@@ -61,7 +62,7 @@ class PopNode(LifecycleNode):
         self._frames = StaticFrames()
         if tf2_msgs is not None:
             self.create_subscription(
-                tf2_msgs.TFMessage, '/tf_static', self._frames.add_message, static_tf_qos())
+                tf2_msgs.TFMessage, '/tf_static', self._on_static_frames, static_tf_qos())
         self._inputs = RgbdInputs(self, self.config.sync.slop_s, self._on_frame)
         self._outputs = NodeOutputs(self)
         self._health = NodeHealth(self, self._inputs, self._statistics)
@@ -199,6 +200,10 @@ class PopNode(LifecycleNode):
     def _is_wanted(self) -> bool:
         is_on = self._is_active and self.config.enabled
         return is_on and (not self.config.lazy or bool(self._outputs.wanted(self.config)))
+
+    def _on_static_frames(self, message: Any) -> None:
+        for text in self._frames.add_message(message):
+            self.log.warning(text)
 
     def _on_frame(self, messages: RgbdMessages) -> None:
         if self._work is not None:

@@ -24,12 +24,20 @@ class StaticFrames:
         """Set where `child` stands in `parent`."""
         self._parents[child.lstrip('/')] = (parent.lstrip('/'), T_parent_child)
 
-    def add_message(self, message: Any) -> None:
-        """Take over the transforms of a tf2_msgs/TFMessage."""
+    def add_message(self, message: Any) -> list[str]:
+        """Take over the transforms of a tf2_msgs/TFMessage; return in words which are none."""
+        refused = []
         for transform in message.transforms:
             t, q = transform.transform.translation, transform.transform.rotation
-            T = from_translation_quaternion([t.x, t.y, t.z, q.x, q.y, q.z, q.w])
-            self.add(transform.header.frame_id, transform.child_frame_id, T)
+            numbers = [t.x, t.y, t.z, q.x, q.y, q.z, q.w]
+            parent, child = transform.header.frame_id, transform.child_frame_id
+            if _is_transform(numbers):
+                self.add(parent, child, from_translation_quaternion(numbers))
+            else:
+                refused.append(
+                    f'/tf_static: expected a translation and a unit quaternion from {parent!r} '
+                    f'to {child!r}, found {numbers}')
+        return refused
 
     def lookup(self, target: str, source: str) -> Float[np.ndarray, '4 4'] | None:
         """Return T_target_source, or None when the tree does not connect the two."""
@@ -61,12 +69,16 @@ def parse_extrinsics(text: str) -> Float[np.ndarray, '4 4'] | None:
         numbers = [float(word) for word in text.replace(',', ' ').split()]
     except ValueError:
         numbers = []
-    finite = len(numbers) == 7 and bool(np.all(np.isfinite(numbers)))
-    if not (finite and abs(np.linalg.norm(numbers[3:]) - 1) < 0.01):
+    if not _is_transform(numbers):
         raise SettingError(
             "depth.extrinsics: expected 'x y z qx qy qz qw' with a unit quaternion, found "
             f'{text!r}')
     return from_translation_quaternion(numbers)
+
+
+def _is_transform(numbers: list[float]) -> bool:
+    finite = len(numbers) == 7 and bool(np.all(np.isfinite(numbers)))
+    return finite and bool(abs(np.linalg.norm(numbers[3:]) - 1) < 0.01)
 
 
 def from_translation_quaternion(numbers: list[float]) -> Float[np.ndarray, '4 4']:

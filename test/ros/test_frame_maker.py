@@ -1,5 +1,7 @@
 """Depth in a frame of its own is registered with a known transform, and never without one."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from geometry_msgs.msg import Transform, TransformStamped
@@ -70,6 +72,20 @@ def test_transforms_of_messages_are_those_of_tf() -> None:
 
     frames.add_message(TFMessage())
     np.testing.assert_allclose(frames.lookup('color', 'depth'), T, atol=1e-12)
+
+
+@pytest.mark.parametrize('field', ['x', 'w'])
+@pytest.mark.parametrize('number', [0.0, np.nan, np.inf])
+def test_a_transform_that_is_none_is_named_and_the_others_are_taken(
+    field: str, number: float
+) -> None:
+    bad, good = TransformStamped(child_frame_id='bad'), TransformStamped(child_frame_id='good')
+    setattr(bad.transform.rotation, field, number)
+    frames, is_bad = StaticFrames(), not (field == 'x' and number == 0.0)
+    told = frames.add_message(SimpleNamespace(transforms=[bad, good]))
+    assert [('bad' in text, 'unit quaternion' in text) for text in told] == [(True, True)] * is_bad
+    assert (frames.lookup('', 'bad') is None) == is_bad
+    assert frames.lookup('', 'good') is not None
 
 
 @pytest.mark.parametrize('source', ['tf', 'parameter'])

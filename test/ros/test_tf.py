@@ -74,7 +74,7 @@ def test_frames_of_a_person_stand_where_the_person_stands(tmp_path: Path) -> Non
 
 BROADCASTER = '''
 import rclpy
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from tf2_msgs.msg import TFMessage
 rclpy.init()
@@ -84,7 +84,8 @@ transform = TransformStamped(child_frame_id='depth')
 transform.header.frame_id = 'camera'
 transform.transform.rotation.w = 1.0
 node.create_publisher(TFMessage, '/tf_static', latched).publish(
-    TFMessage(transforms=[transform]))
+    TFMessage(transforms=[TransformStamped(transform=Transform(rotation=Quaternion(w=0.0))),
+                          transform]))
 rclpy.spin(node)
 '''
 
@@ -120,3 +121,4 @@ def test_depth_in_a_frame_of_its_own_is_registered_once_tf_tells_where_it_is(
             assert (int(values['frames']) > 0) == told
     assert int(values['dropped: bad message']) == plan.frames
     assert 'no transform between them' in node.output
+    assert '/tf_static: expected a translation and a unit quaternion' in node.output
