@@ -32,6 +32,7 @@ class EstimateStatus(Enum):
     )
     TOO_FAR = 'beyond max_range_m'
     OUTSIDE = 'outside the region of interest (region.*)'
+    TOO_MANY = 'one more than max_people, which takes the nearest'
     NO_SUPPORT = 'the fitted body does not explain the depth of its pixels: probably no person'
     NO_SKELETON = (
         'no human pose comes near the lifted joints: the keypoints are not those of one person'

@@ -127,7 +127,10 @@ class BodyPipeline:
         scene = Scene(frame, ground, noise, np.zeros(frame.depth_m.shape, dtype=bool))
         bodies: list[BodyEstimate] = []
         for i in nearest_first(distance_m, detections):
-            if statuses[i] is not EstimateStatus.OK or len(bodies) >= self.config.max_people:
+            if statuses[i] is not EstimateStatus.OK:
+                continue
+            if len(bodies) >= self.config.max_people:
+                statuses[i] = EstimateStatus.TOO_MANY
                 continue
             person = self.fit_person(scene, detections[i], lifted[i], watch)
             statuses[i] = person.status

@@ -82,11 +82,13 @@ class BodyTracker:
         self._last = frame.camera, frame.stamp_ns
         with watch.step('undistort'):
             seen = undistort_frame(frame)
-        is_late = self._fresh.poll() or (
-            self._gap.is_long and any(track.has_just_begun for track in self._tracks))
+        is_late = self._fresh.poll()
         fresh = self._fresh.take(None)
-        has_failed = fresh is not None and self._welcome(fresh) is None
-        self._refused = fresh.person.status if fresh is not None and has_failed else None
+        if fresh is not None and self._welcome(fresh) is None:
+            # Who stands too far away, say, is no reason to look again at once.
+            self._refused, is_late = fresh.person.status, False
+        is_late = is_late or (
+            self._gap.is_long and any(track.has_just_begun for track in self._tracks))
         with self._blas.limit(limits=1, user_api='blas'):
             found = self._look(frame, seen, watch, is_late=is_late)
             bodies, statuses = self._track(seen, found, watch)
@@ -97,6 +99,7 @@ class BodyTracker:
     def _forget(self) -> None:
         self._tracks.clear()
         self._fresh.forget()
+        self._refused = None
         self._last, self._ground = None, None
         self._schedule = DetectionSchedule(self.config)
 
@@ -210,7 +213,7 @@ class BodyTracker:
     ) -> tuple[EstimateStatus, BodyEstimate | None]:
         """Begin the track of a person who was detected and is nobody known."""
         if len(self._tracks) >= self.pipeline.config.max_people:
-            return EstimateStatus.OK, None
+            return EstimateStatus.TOO_MANY, None
         with watch.step('begin'):
             self._ask(scene, found, index)
         fresh = self._fresh.take(None)

@@ -1,6 +1,7 @@
 """People found anew beside the others: who waits, who does not, and what comes in late."""
 
 from concurrent.futures import Future
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.depth_noise import USUAL_NOISE
 from pop_core.estimate import EstimateStatus, TrackState
 from pop_core.keypoints.detection import Detection
-from pop_core.pipeline import Scene
+from pop_core.pipeline import BodyPipeline, Scene
 from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, Gap
 from pop_core.tracking.finder import FoundPerson, find_person
 from pop_core.tracking.fresh_fits import FreshFits
@@ -175,10 +176,27 @@ def test_who_was_fitted_in_vain_is_told_why(
     (future, _, _), = late.waiting
     late.waiting.clear()
     future.set_result(FoundPerson(EstimateStatus.NO_SUPPORT))
-    stage.show(person, here)
-    assert sorted(status.name for status in stage.statuses) == ['NO_SUPPORT', 'OK']
-    stage.show(person, here, times=3)
-    assert EstimateStatus.NO_SUPPORT not in stage.statuses
+    looks = stage.source.asked
+    told = []
+    for _ in range(7):
+        stage.show(person, here)
+        told += [status.name for status in stage.statuses if status is not EstimateStatus.OK]
+    # Told once, and looked for again no sooner than others are.
+    assert told[0] == 'NO_SUPPORT'
+    assert set(told[1:]) == {'WAITING'}
+    assert stage.source.asked - looks <= 3
+
+
+def test_one_more_than_the_most_is_told_so(stage: Stage, person: BodyParameters) -> None:
+    pipeline = stage.tracker.pipeline
+    config = replace(pipeline.config, max_people=1)
+    few = BodyPipeline(pipeline.model, pipeline.library, stage.source, config)
+    stage.tracker.configure(few, TrackingConfig())
+    stage.show(person, newcomer(person, 0))
+    expected = [EstimateStatus.OK, EstimateStatus.TOO_MANY]
+    assert sorted(stage.statuses, key=expected.index) == expected
+    alone = few.process(stage.frame(*stage.source.people, hidden=False))
+    assert sorted(alone.statuses, key=expected.index) == expected
 
 
 def test_a_fit_is_ready_for_whole_frames_only_and_for_its_owner_only(
