@@ -172,8 +172,8 @@ class FrameWork:
         try:
             written = save_snapshot(
                 folder, frame, self._fitter.detect(frame), result, self._fitter.model)
-        except (OSError, PopError) as error:
-            return False, str(error)
+        except Exception as error:  # noqa: BLE001 - whoever asked waits for an answer
+            return False, str(error) or type(error).__name__
         return True, str(written)
 
     def _on_error(self, error: Exception) -> None:

@@ -59,7 +59,7 @@ def node() -> Iterator[LifecycleNode]:
 
 
 def test_frames_after_a_fault_are_fitted_and_the_fault_is_counted(
-    node: LifecycleNode, capfd: pytest.CaptureFixture[str]
+    node: LifecycleNode, capfd: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     statistics, detector = NodeStatistics(), Faulty()
     settings = ConfigParameters(node, NodeConfig(lazy=False), PipelineConfig(), lambda: None)
@@ -73,6 +73,9 @@ def test_frames_after_a_fault_are_fitted_and_the_fault_is_counted(
             work.put(RgbdMessages(color, depth, info, 0.0))
             assert clock.spin_until(lambda: statistics.snapshot().pending == 0, 10)
             assert detector.calls == count
+        answer = work.snapshot(tmp_path)
+        assert clock.spin_until(answer.done, 10)
+        assert answer.result() == (False, 'division by zero')
     assert work.stop(10)
     snapshot = statistics.snapshot()
     assert (snapshot.frames, snapshot.faults, snapshot.refused) == (3, 3, 3)
