@@ -1,28 +1,16 @@
 """The embedded network on real frames; skipped where the shared data is not there."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from support.real_frames import SOFA, load
 
 from pop_core.keypoints.depth_net import EMBEDDED, load_depth_net
 from pop_core.rgbd import RgbdFrame
-from pop_ros.frame_folder import load_frame
-
-RGBD = Path(__file__).resolve().parents[4] / 'shared' / 'data' / 'rgbd'
-SOFA = ('00', '06', '12', '18', '24', '30', '36', '42', '48', '54', '60', '66')
 
 
 @pytest.fixture(scope='module')
 def detector():
     return load_depth_net()
-
-
-def load(name):
-    folder = RGBD / name
-    if not folder.is_dir():
-        pytest.skip(f'looked for {folder}')
-    return load_frame(folder)
 
 
 def test_the_embedded_network_is_small_enough_to_ship():

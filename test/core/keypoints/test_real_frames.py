@@ -1,23 +1,16 @@
 """Real networks on real frames; skipped where the shared data is not there."""
 
-import json
-from pathlib import Path
-
-import cv2
 import numpy as np
 import pytest
+from support.real_frames import DATA, SOFA, load
 
 from pop_core.body.joints import SHARED_INDEX
-from pop_core.geometry.camera import Camera
 from pop_core.keypoints.fusion import FusedDetector
 from pop_core.keypoints.lifting import lift_keypoints
 from pop_core.keypoints.onnx_detector import load_source
-from pop_core.rgbd import RgbdFrame, clean_depth
 
-SHARED = Path(__file__).resolve().parents[4] / 'shared' / 'data'
-NETWORK = SHARED / 'models' / 'posenet_mobilenet_v1_075_481_641_dequant.onnx'
-CLOSER = SHARED / 'models' / 'EfficientPoseII.onnx'
-SOFA = ('00', '06', '12', '18', '24', '30', '36', '42', '48', '54', '60', '66')
+NETWORK = DATA / 'models' / 'posenet_mobilenet_v1_075_481_641_dequant.onnx'
+CLOSER = DATA / 'models' / 'EfficientPoseII.onnx'
 
 
 @pytest.fixture(scope='module')
@@ -25,18 +18,6 @@ def detector():
     if not NETWORK.is_file():
         pytest.skip(f'looked for {NETWORK}')
     return load_source(NETWORK)
-
-
-def load(name):
-    folder = SHARED / 'rgbd' / name
-    if not folder.is_dir():
-        pytest.skip(f'looked for {folder}')
-    file = next(p for p in (folder / 'camera.json', folder.parent / 'camera.json') if p.is_file())
-    k = json.loads(file.read_text())
-    rgb = cv2.cvtColor(cv2.imread(str(folder / 'color.png')), cv2.COLOR_BGR2RGB)
-    depth = cv2.imread(str(folder / 'depth.png'), cv2.IMREAD_UNCHANGED).astype(np.float32) / 1000
-    camera = Camera(k['width'], k['height'], k['fx'], k['fy'], k['cx'], k['cy'])
-    return RgbdFrame(rgb, clean_depth(depth), camera)
 
 
 def test_five_people_are_five(detector):

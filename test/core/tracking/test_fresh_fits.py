@@ -154,12 +154,18 @@ def test_an_error_of_a_late_fit_is_raised_once(
     assert not fits.is_busy
 
 
-def test_who_is_lost_to_an_error_is_found_without_help(
-    stage: Stage, late: Late, person: BodyParameters
-) -> None:
+def waiting_newcomer(stage: Stage, person: BodyParameters) -> BodyParameters:
+    """Somebody who came to a person who is followed, and is being fitted."""
     stage.show(person, times=5)
     here = newcomer(person, 0)
     stage.show(person, here, times=3)
+    return here
+
+
+def test_who_is_lost_to_an_error_is_found_without_help(
+    stage: Stage, late: Late, person: BodyParameters
+) -> None:
+    here = waiting_newcomer(stage, person)
     late.fail()
     with pytest.raises(MemoryError):
         stage.show(person, here)
@@ -170,9 +176,7 @@ def test_who_is_lost_to_an_error_is_found_without_help(
 def test_who_was_fitted_in_vain_is_told_why(
     stage: Stage, late: Late, person: BodyParameters
 ) -> None:
-    stage.show(person, times=5)
-    here = newcomer(person, 0)
-    stage.show(person, here, times=3)
+    here = waiting_newcomer(stage, person)
     (future, _, _), = late.waiting
     late.waiting.clear()
     future.set_result(FoundPerson(EstimateStatus.NO_SUPPORT))
