@@ -16,11 +16,12 @@ from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.fitting.hypotheses import WIDEST_M, Hypothesis, HypothesisSteps
 from pop_core.fitting.initialisation import initial_parameters
 from pop_core.fitting.levenberg_marquardt import assemble, cost_of
-from pop_core.fitting.limb_exchange import Judge, exchange_limbs
+from pop_core.fitting.limb_exchange import exchange_limbs
 from pop_core.fitting.limb_proposals import LimbProposals
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.priors import neighbour_sigma_rad
 from pop_core.fitting.readings import best_facing, best_reading
+from pop_core.fitting.trials import Judge
 from pop_core.retrieval.candidate import PoseCandidate
 from pop_core.retrieval.pose_prior import PosePrior
 from pop_core.segmentation.body_segmentation import SegmentationConfig
@@ -88,8 +89,7 @@ class BodyFitter:
         hypotheses = _best(started, self.config.surface_hypotheses)
         for hypothesis in hypotheses:
             self.steps.fit_surface(hypothesis, observation, EARLY_SCALES_M, free_space=False)
-        judge = self._judge(hypotheses, observation)
-        judge(hypotheses)
+        judge = self._judge(observation, self._compare(hypotheses, observation))
         hypotheses = [
             exchange_limbs(hypothesis, [h for h in started if h is not hypothesis], judge)
             for hypothesis in _best(hypotheses, self.config.final_hypotheses)]
@@ -97,12 +97,13 @@ class BodyFitter:
             hypotheses = [best_reading(each, observation, judge) for each in hypotheses]
         for hypothesis in hypotheses:
             self.steps.fit_surface(hypothesis, observation, LATE_SCALES_M, free_space=True)
+        segment = self._compare(hypotheses, observation)
         for _ in range(self.config.limb_searches):
-            before, hypotheses = hypotheses, self._with_limbs_found(
-                hypotheses, started, observation)
-            if hypotheses == before:
+            found = self._with_limbs_found(hypotheses, started, observation, segment)
+            kept = _best([*hypotheses, *found], len(hypotheses))
+            if not any(each in found for each in kept):
                 break
-        self._judge(hypotheses, observation)(hypotheses)
+            hypotheses, segment = kept, self._compare(kept, observation)
         winner, *others = _best(hypotheses, len(hypotheses))
         named = observation
         if self.config.other_readings:
@@ -117,15 +118,10 @@ class BodyFitter:
 
     def _with_limbs_found(
         self, hypotheses: Sequence[Hypothesis], donors: Sequence[Hypothesis],
-        observation: Observation,
+        observation: Observation, segment: Bool[np.ndarray, 'h w'],
     ) -> list[Hypothesis]:
-        """Return as many hypotheses, the better ones with and without limbs looked for anew."""
-        segment = self.steps.common_segment(hypotheses, observation)
-
-        def judge(judged: Sequence[Hypothesis]) -> None:
-            self.steps.score(judged, observation, segment)
-
-        judge(hypotheses)
+        """Return hypotheses that took limbs which were looked for anew, fitted with them."""
+        judge = self._judge(observation, segment)
         found = []
         for hypothesis in hypotheses:
             better = self.limbs.improve(hypothesis, donors, observation, segment, judge)
@@ -133,11 +129,18 @@ class BodyFitter:
                 self.steps.fit_surface(better, observation, SEARCHED_SCALES_M, free_space=True)
                 found.append(better)
         judge(found)
-        return _best([*hypotheses, *found], len(hypotheses)) if found else list(hypotheses)
+        return found
 
-    def _judge(self, hypotheses: Sequence[Hypothesis], observation: Observation) -> Judge:
-        """Return what sets costs by E_depth over the pixels that most hypotheses agree on."""
+    def _compare(
+        self, hypotheses: Sequence[Hypothesis], observation: Observation
+    ) -> Bool[np.ndarray, 'h w']:
+        """Set costs by E_depth over the pixels that most agree on; return those pixels."""
         segment = self.steps.common_segment(hypotheses, observation)
+        self._judge(observation, segment)(hypotheses)
+        return segment
+
+    def _judge(self, observation: Observation, segment: Bool[np.ndarray, 'h w']) -> Judge:
+        """Return what sets costs by E_depth over some pixels."""
         return lambda judged: self.steps.score(judged, observation, segment)
 
     def _polished(self, winner: Hypothesis, observation: Observation) -> Hypothesis:

@@ -7,31 +7,16 @@ of the others can.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool
 
-from pop_core.body.joints import JOINT_INDEX
 from pop_core.fitting.hypotheses import Hypothesis
+from pop_core.fitting.limb_points import KINDS
+from pop_core.fitting.trials import Judge, cheapest, with_pose
 
 MARGIN = 1.0  # cost that an exchange must save: less is noise
-
-Judge = Callable[[Sequence[Hypothesis]], None]
-
-
-def _limb(*names: str) -> Bool[np.ndarray, '23']:
-    """Return which rotations of a body pose bend a limb."""
-    chosen = np.zeros(23, dtype=bool)
-    chosen[[JOINT_INDEX[name] - 1 for name in names]] = True
-    return chosen
-
-
-LIMBS = tuple(
-    _limb(*(f'{side}_{joint}' for joint in joints))
-    for joints in (('shoulder', 'elbow', 'wrist'), ('hip', 'knee', 'ankle'))
-    for side in ('left', 'right'))
+LIMBS = tuple(np.isin(np.arange(23), kind.rows) for kind in KINDS)  # rotations that bend a limb
 
 
 def exchange_limbs(
@@ -45,22 +30,11 @@ def exchange_limbs(
         judge: Sets the cost of hypotheses.
     """
     for limb in LIMBS:
-        trials = [_with_limb(best, other, limb) for other in others]
-        judge(trials)
-        cheapest = min(trials, key=lambda trial: trial.cost, default=best)
-        if cheapest.cost < best.cost - MARGIN:
-            best = cheapest
+        turns, pose = limb[:, None], best.state.parameters.body_pose
+        trials = [
+            with_pose(
+                best, np.where(turns, other.state.parameters.body_pose, pose),
+                np.where(turns, other.belief.pose, best.belief.pose))
+            for other in others]
+        best = cheapest(best, trials, judge, MARGIN)
     return best
-
-
-def _with_limb(
-    hypothesis: Hypothesis, donor: Hypothesis, limb: Bool[np.ndarray, '23']
-) -> Hypothesis:
-    parameters = hypothesis.state.parameters
-    theirs = donor.state.parameters.body_pose
-    pose = np.where(limb[:, None], theirs, parameters.body_pose)
-    expected = np.where(limb[:, None], donor.belief.pose, hypothesis.belief.pose)
-    return replace(
-        hypothesis,
-        state=hypothesis.state.body.state(replace(parameters, body_pose=pose)),
-        belief=replace(hypothesis.belief, pose=expected))

@@ -8,7 +8,6 @@ in. The cheapest of many limbs of the pose prior, none like another, then compet
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -16,11 +15,11 @@ from jaxtyping import Bool, Float
 from pop_core.fitting.depth_consistency import CLOTHES_M, DEPTH_LIMIT_M
 from pop_core.fitting.energy import TermWeights
 from pop_core.fitting.hypotheses import DEPTH_SCORE, Hypothesis
-from pop_core.fitting.limb_exchange import Judge
 from pop_core.fitting.limb_points import KINDS, LimbKind, LimbPoints, limb_points
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import RAY_SCALE_M
 from pop_core.fitting.robust_loss import geman_mcclure_share
+from pop_core.fitting.trials import Judge, cheapest, with_pose
 from pop_core.rendering.depth_renderer import render_depth
 from pop_core.retrieval.pose_prior import PosePrior
 
@@ -57,10 +56,7 @@ class LimbProposals:
         for kind in KINDS:
             trials = [_with_limb(hypothesis, kind, pose)
                       for pose in _competing(hypothesis, kind, poses, observation, segment)]
-            judge(trials)
-            cheapest = min(trials, key=lambda trial: trial.cost, default=hypothesis)
-            if cheapest.cost < hypothesis.cost - MARGIN:
-                hypothesis = cheapest
+            hypothesis = cheapest(hypothesis, trials, judge, MARGIN)
         return hypothesis
 
 
@@ -153,9 +149,7 @@ def _depth_cost(
 def _with_limb(
     hypothesis: Hypothesis, kind: LimbKind, limb: Float[np.ndarray, '3 3']
 ) -> Hypothesis:
-    parameters = hypothesis.state.parameters
-    pose, expected = parameters.body_pose.copy(), hypothesis.belief.pose.copy()
+    pose = hypothesis.state.parameters.body_pose.copy()
+    expected = hypothesis.belief.pose.copy()
     pose[kind.rows], expected[kind.rows] = limb, limb
-    return replace(
-        hypothesis, state=hypothesis.state.body.state(parameters.replaced(body_pose=pose)),
-        belief=replace(hypothesis.belief, pose=expected))
+    return with_pose(hypothesis, pose, expected)

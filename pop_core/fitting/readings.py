@@ -16,9 +16,9 @@ from pop_core.body.model import BodyParameters
 from pop_core.fitting.bone_rolls import rolled_limbs, unrolled
 from pop_core.fitting.hypotheses import Hypothesis, HypothesisSteps
 from pop_core.fitting.levenberg_marquardt import FIRST_DAMPING
-from pop_core.fitting.limb_exchange import Judge
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.side_exchange import turned_around, with_legs_exchanged
+from pop_core.fitting.trials import Judge, cheapest
 
 MARGIN = 2.0  # cost that another reading must save: detectors rarely take left for right
 HOPEFUL = 60.0  # a turned body may win once it is fitted, if it costs no more than this beyond
@@ -44,9 +44,7 @@ def best_reading(
         trials.append(_reading(hypothesis, parameters.replaced(body_pose=pose)))
     if np.count_nonzero(observation.lifted.lifted[LEG_JOINTS]) < len(LEG_JOINTS) - 1:
         trials.append(_reading(hypothesis, with_legs_exchanged(model, parameters)))
-    judge(trials)
-    cheapest = min(trials, key=lambda trial: trial.cost, default=hypothesis)
-    return cheapest if cheapest.cost < hypothesis.cost - MARGIN else hypothesis
+    return cheapest(hypothesis, trials, judge, MARGIN)
 
 
 def best_facing(

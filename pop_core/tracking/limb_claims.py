@@ -15,17 +15,14 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from pop_core.body.joints import JOINT_INDEX, JOINT_NAMES, SHARED_INDEX
+from pop_core.body.joints import JOINT_NAMES, SHARED_INDEX
 from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.limb_points import KINDS
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import Pairs
 from pop_core.rendering.depth_renderer import render_depth
 
-SIDES = ('left', 'right')
-ARM, LEG = ('shoulder', 'elbow', 'wrist', 'hand'), ('hip', 'knee', 'ankle', 'foot')
-LIMBS = tuple(
-    tuple(JOINT_INDEX[f'{side}_{part}'] for part in parts)
-    for parts in (ARM, LEG) for side in SIDES)
+LIMBS = tuple(kind.joints for kind in KINDS)
 ARM_LIMBS = (0, 1)
 ENDS = np.array([SHARED_INDEX[JOINT_NAMES[limb[2]]] for limb in LIMBS])  # wrists and ankles
 TRUNK_SIGMA_M = 0.02  # cloth, and the place of what is surer

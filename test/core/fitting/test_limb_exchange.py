@@ -10,8 +10,9 @@ from pop_core.fitting.body_state import FitBody
 from pop_core.fitting.energy import PriorBelief
 from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.fitting.hypotheses import Hypothesis, HypothesisSteps
-from pop_core.fitting.limb_exchange import LIMBS, Judge, exchange_limbs
+from pop_core.fitting.limb_exchange import LIMBS, exchange_limbs
 from pop_core.fitting.observation import Observation, observe
+from pop_core.fitting.trials import Judge
 from pop_core.retrieval.pose_prior import load_pose_prior
 from pop_core.segmentation.body_segmentation import SegmentationConfig
 

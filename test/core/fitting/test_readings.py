@@ -13,11 +13,11 @@ from pop_core.fitting.body_state import FitBody
 from pop_core.fitting.bone_rolls import LIMBS, rolled_limbs
 from pop_core.fitting.energy import PriorBelief
 from pop_core.fitting.hypotheses import Hypothesis
-from pop_core.fitting.limb_exchange import Judge
 from pop_core.fitting.observation import Observation, observe
 from pop_core.fitting.plausibility import plausibility
 from pop_core.fitting.readings import best_reading
 from pop_core.fitting.side_exchange import turned_around, with_legs_exchanged
+from pop_core.fitting.trials import Judge
 from pop_core.geometry.rotation import from_rotvec, to_rotvec
 from pop_core.retrieval.candidate import PoseCandidate
 from pop_core.retrieval.pose_prior import load_pose_prior
