@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -19,6 +19,7 @@ MASK_WORTH_M = 0.15  # a detection within a person's pixels is as good as this m
 SIZE_WORTH_M = 0.6  # per unit of log size
 SIZE_SIGMA = 0.12  # two lifted skeletons of one person differ by this [log size]
 FEWEST_BONES = 3
+COVERED_WORTH_M = 0.1  # a joint that is known across its ray only is as good as this far off
 NO_MATCH = 1e6
 BONE_ENDS = np.array([(SHARED_INDEX[a], SHARED_INDEX[b]) for a, b, _ in BONES])
 
@@ -31,11 +32,26 @@ class Expected:
         points: The 15 shared points [m], camera frame.
         doubt_m: Standard deviation of the whole person's place.
         mask: Pixels of the person in the last frame.
+        cover: Pixels of people who stand nearer: what is lifted there may be theirs; None for
+            nobody.
     """
 
     points: Float[np.ndarray, 's 3']
     doubt_m: float
     mask: Bool[np.ndarray, 'h w']
+    cover: Bool[np.ndarray, 'h w'] | None = None
+
+
+def behind_others(people: Sequence[Expected]) -> list[Expected]:
+    """Return people with the pixels of all who stand nearer than each of them."""
+    out = list(people)
+    cover: Bool[np.ndarray, 'h w'] | None = None
+    for row in np.argsort([np.median(person.points[:, 2]) for person in people]).tolist():
+        own = people[row].mask
+        if cover is not None:
+            out[row] = replace(people[row], cover=cover & ~own)
+        cover = own if cover is None else cover | own
+    return out
 
 
 def associate(
@@ -54,10 +70,19 @@ def associate(
     for row, person in enumerate(expected):
         for column, (detection, joints) in enumerate(zip(detections, lifted, strict=True)):
             cost[row, column] = matching_cost(person, detection, joints, gate_m)
-    rows, columns = linear_sum_assignment(cost)
+    # Whoever stays without a detection costs as much as the worst that could be theirs: nobody
+    # takes another's to leave none over.
+    alone = np.full((len(expected), len(expected)), NO_MATCH)
+    np.fill_diagonal(alone, [MASK_WORTH_M + reach_m(person, gate_m) for person in expected])
+    rows, columns = linear_sum_assignment(np.hstack([cost, alone]))
     return {
         int(row): int(column) for row, column in zip(rows, columns, strict=True)
-        if cost[row, column] < NO_MATCH}
+        if column < len(detections) and cost[row, column] < NO_MATCH}
+
+
+def reach_m(person: Expected, gate_m: float) -> float:
+    """Return how far from the prediction a person may be found [m]."""
+    return gate_m + 2.0 * min(person.doubt_m, UNSURE_M / 2.0)
 
 
 def matching_cost(
@@ -71,7 +96,7 @@ def matching_cost(
     if not lifted.lifted.any():
         return NO_MATCH if overlap < 0.5 else MASK_WORTH_M * (2.0 - overlap)
     distance = offset_m(person, lifted)
-    if distance > gate_m + 2.0 * min(person.doubt_m, UNSURE_M / 2.0):
+    if distance > reach_m(person, gate_m):
         return NO_MATCH
     size = log_size(lifted, person.points)
     strange = max(0.0, abs(size) - SIZE_SIGMA)
@@ -79,19 +104,35 @@ def matching_cost(
 
 
 def offset_m(person: Expected, lifted: LiftedJoints) -> float:
-    """Return how far lifted joints lie from a person's, the median; 0 where none is lifted."""
+    """Return how far lifted joints lie from a person's, the median; 0 where none is lifted.
+
+    Joints that were lifted onto somebody nearer tell their direction only.
+    """
     rows = lifted.lifted
     if not rows.any():
         return 0.0
-    offset = np.linalg.norm(person.points[rows] - lifted.positions_camera[rows], axis=1)
-    return float(np.median(offset))
+    points, found = person.points[rows], lifted.positions_camera[rows]
+    distance = np.linalg.norm(points - found, axis=1)
+    if person.cover is not None:
+        covered = _on_mask(person.cover, lifted.keypoints_px[rows])
+        along = found / np.linalg.norm(found, axis=1, keepdims=True)
+        across = points - np.einsum('nc,nc->n', points, along)[:, None] * along
+        aside = COVERED_WORTH_M + np.linalg.norm(across, axis=1)
+        distance = np.where(covered, np.minimum(distance, aside), distance)
+    return float(np.median(distance))
 
 
 def mask_overlap(mask: Bool[np.ndarray, 'h w'], detection: Detection) -> float:
     """Return the share of a detection's keypoints that lie on a mask."""
     uv = detection.keypoints_px[np.isfinite(detection.keypoints_px).all(axis=1)]
+    return float(_on_mask(mask, uv).mean()) if len(uv) else 0.0
+
+
+def _on_mask(
+    mask: Bool[np.ndarray, 'h w'], uv: Float[np.ndarray, 'n 2']
+) -> Bool[np.ndarray, 'n']:
     u, v = np.clip(np.rint(uv), 0, np.array(mask.shape[::-1]) - 1).astype(np.int64).T
-    return float(mask[v, u].mean()) if len(uv) else 0.0
+    return np.asarray(mask[v, u])
 
 
 def log_size(lifted: LiftedJoints, points: Float[np.ndarray, 's 3']) -> float:

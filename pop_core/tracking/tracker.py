@@ -15,7 +15,7 @@ from pop_core.pipeline import BodyPipeline, Scene
 from pop_core.rgbd import RgbdFrame, distort_mask, undistort_frame
 from pop_core.segmentation.ground import Ground, find_ground
 from pop_core.stopwatch import Stopwatch
-from pop_core.tracking.association import Expected, associate, offset_m
+from pop_core.tracking.association import Expected, associate, behind_others, offset_m
 from pop_core.tracking.body_filter import first_state
 from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, Gap
 from pop_core.tracking.doubts import STALE_S, count_misses, is_doubtful, is_settled, is_stale
@@ -134,7 +134,7 @@ class BodyTracker:
         with watch.step('predict'):
             for track in self._tracks:
                 self._follower.predict(track, frame.stamp_ns)
-            expected = [self._expected(track) for track in self._tracks]
+            expected = behind_others([self._expected(track) for track in self._tracks])
             matches = associate(
                 expected, found.detections, found.lifted, self.config.gate_m)
         scene = Scene(

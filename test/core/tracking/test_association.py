@@ -1,5 +1,7 @@
 """Who is who: distance, pixels and size decide together, and nobody is taken twice."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.one_person import CAMERA, lift_truth
@@ -8,7 +10,7 @@ from pop_core.body.kinematics import attached_positions
 from pop_core.body.model import BodyModel, BodyParameters, shared_points
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.lifted_joints import LiftedJoints
-from pop_core.tracking.association import Expected, associate, log_size
+from pop_core.tracking.association import Expected, associate, behind_others, log_size
 
 GATE_M = 0.35
 NOWHERE = np.zeros((CAMERA.height, CAMERA.width), dtype=bool)
@@ -83,3 +85,29 @@ def test_size_is_that_of_the_bones(body: BodyModel, person: BodyParameters) -> N
 def test_without_detections_nobody_is_matched(body: BodyModel, person: BodyParameters) -> None:
     assert matches([expected(body, person, 0.0)], []) == {}
     assert matches([], [seen(body, person, 0.0)]) == {}
+
+
+def test_who_is_lifted_onto_somebody_nearer_keeps_the_number(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    found, lifted = seen(body, person, 0.0)
+    nearer = replace(lifted, positions_camera=0.7 * lifted.positions_camera)
+    u, v = np.rint(found.keypoints_px).astype(int).T
+    front = NOWHERE.copy()
+    front[v, u] = True
+    hidden = expected(body, person, 0.0)
+    in_front = Expected(0.7 * expected(body, person, 0.0).points, 0.01, front)
+    assert matches([hidden], [(found, nearer)]) == {}
+    assert associate(
+        behind_others([hidden, in_front]), [found, found],
+        [nearer, replace(nearer, positions_camera=0.69 * lifted.positions_camera)],
+        GATE_M).keys() == {0, 1}
+
+
+def test_nobody_takes_the_detection_of_another_to_leave_none_over(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    people = [expected(body, person, x, doubt_m=0.3) for x in (0.0, 0.9)]
+    # The second detection lies between them; the first is exactly the first person's.
+    found = [seen(body, person, 0.0), seen(body, person, -0.8)]
+    assert matches(people, found) == {0: 0}
