@@ -9,9 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from threadpoolctl import ThreadpoolController
 
-from pop_core.body.kinematics import joint_rotations
 from pop_core.body.model import BodyModel
-from pop_core.body.skinning import vertices
 from pop_core.config import PipelineConfig
 from pop_core.depth_noise import DepthNoise, estimate_depth_noise
 from pop_core.estimate import BodyEstimate, EstimateStatus, FrameResult
@@ -42,6 +40,7 @@ from pop_core.stopwatch import Stopwatch
 SMALLEST_EXTENT_M = 0.15  # joints nearer together than this are no skeleton
 DOUBTFUL_SCORE = 0.65  # a body that explains so little may be somebody seen from the other side
 CLEARLY_BETTER = 0.1  # by how much the score must rise for it
+MARGIN = 2.0  # around a body, of how far its segment may grow: a limb may be nearer than the rest
 SAME_PLACE_M = 0.3  # a person behind another is often lifted onto the one in front
 
 
@@ -225,11 +224,12 @@ class BodyPipeline:
             fit: The body.
             trust: Share 0..1 that multiplies the support to the score.
         """
-        parameters = fit.parameters
-        mesh = vertices(self.model, parameters)
-        window = body_window(mesh, scene.frame.camera)
+        parameters, body = fit.parameters, self.fitter.full
+        mesh = body.skinning.vertices(parameters, fit.coarse.skeleton)
+        window = body_window(
+            mesh, scene.frame.camera, margin_m=MARGIN * self.config.segmentation.growth_m)
         camera, depth_m = window.camera(scene.frame.camera), window.cut(scene.frame.depth_m)
-        rendered = render_depth(mesh, self.model.f, camera)
+        rendered = render_depth(mesh, body.faces, camera, closed=body.is_closed)
         free = ~window.cut(scene.taken)
         own = np.isfinite(depth_m) & free
         if scene.ground is not None:
@@ -244,7 +244,7 @@ class BodyPipeline:
             self.model, parameters, fit.hessian, fit.runners_up, state, support)
         estimate = BodyEstimate(
             parameters=parameters, vertices=mesh, joints=joints,
-            joint_rotations=joint_rotations(self.model, parameters), joint_state=state,
+            joint_rotations=fit.coarse.skeleton.G, joint_state=state,
             joint_covariance=covariance, mask=mask, score=support * trust,
             energies=fit.energies, runners_up=fit.runners_up,
         )

@@ -18,7 +18,7 @@ from pop_core.body.kinematics import (
 )
 from pop_core.body.model import AttachedPoints, BodyModel, BodyParameters, shared_points
 from pop_core.body.skinning import SkinningSubset
-from pop_core.rendering.depth_renderer import vertex_normals
+from pop_core.rendering.depth_renderer import is_closed, vertex_normals
 
 TRANSL = slice(0, 3)
 GLOBAL_ORIENT = slice(3, 6)
@@ -41,6 +41,7 @@ class FitBody:
         self.model = model
         self.skinning = SkinningSubset(model, None if full else model.fit_vertices)
         self.faces: Int[np.ndarray, 'm 3'] = model.f if full else model.fit_faces
+        self.is_closed = is_closed(self.skinning.v_template, self.faces)
         self.landmarks: AttachedPoints = shared_points(model)
         self.capsules: BodyCapsules = body_capsules(model)
         self.size = 3 + 72 + model.n_betas + 1

@@ -13,7 +13,8 @@ NEAREST_M = 0.3
 
 
 def body_window(
-    p_camera: Float[np.ndarray, 'n 3'], camera: Camera, longest_px: int = 100_000
+    p_camera: Float[np.ndarray, 'n 3'], camera: Camera, longest_px: int = 100_000,
+    margin_m: float = MARGIN_M,
 ) -> Window:
     """Return the window that holds the points of a body [m], at least one pixel of the image.
 
@@ -21,9 +22,10 @@ def body_window(
         p_camera: Points, camera frame.
         camera: Pinhole of the image.
         longest_px: Longest side of the window once thinned.
+        margin_m: What is kept around the points [m].
     """
     z = np.maximum(p_camera[:, 2], NEAREST_M)
-    margin_px = MARGIN_M * max(camera.fx, camera.fy) / float(np.median(z))
+    margin_px = margin_m * max(camera.fx, camera.fy) / float(np.median(z))
     left, right = _span(camera.fx * p_camera[:, 0] / z + camera.cx, margin_px, camera.width)
     top, bottom = _span(camera.fy * p_camera[:, 1] / z + camera.cy, margin_px, camera.height)
     stride = max(1, -(-max(right - left, bottom - top) // longest_px))

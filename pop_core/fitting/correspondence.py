@@ -66,7 +66,9 @@ def match_points(
     facing = np.flatnonzero(visibility.facing)
     if len(facing) == 0 or len(points) == 0:
         return no_pairs()
-    distance, nearest = cKDTree(state.vertices[facing]).query(points)
+    # A tree for one query: balancing it takes longer than it saves.
+    tree = cKDTree(state.vertices[facing], balanced_tree=False, compact_nodes=False)
+    distance, nearest = tree.query(points)
     vertex = facing[nearest]
     worth = EFFECTIVE_POINTS * geman_mcclure_weight(distance, scale_m)
     # A point recognised as an arm never pulls on the chest it rests on.

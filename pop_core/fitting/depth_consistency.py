@@ -17,6 +17,7 @@ from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.observation import Observation, nearest_of
 from pop_core.fitting.residuals import Pairs, join_pairs
 from pop_core.fitting.robust_loss import geman_mcclure_weight
+from pop_core.fitting.sight_kernels import see
 from pop_core.rendering.depth_renderer import RenderedDepth, render_depth
 
 SELF_TOLERANCE_M = 0.03  # z-buffer against vertex: a triangle's own slope
@@ -60,30 +61,17 @@ class Visibility:
 
 def render_body(state: BodyState, observation: Observation) -> RenderedDepth:
     """Return a body as the camera of an observation would see it alone."""
-    return render_depth(state.vertices, state.body.faces, observation.camera)
+    body = state.body
+    return render_depth(state.vertices, body.faces, observation.camera, closed=body.is_closed)
 
 
 def see_body(state: BodyState, observation: Observation) -> Visibility:
     """Return the visibility of a body's vertices in an observation."""
-    rendered = render_body(state, observation)
-    measured, uv = observation.depth_at(state.vertices)
-    z = state.vertices[:, 2]
-    inside = np.isfinite(measured) | np.isnan(measured)
-    safe = np.where(inside[:, None], uv, 0)
-    front = rendered.depth_m[safe[:, 1], safe[:, 0]]
-    toward = np.einsum('nc,nc->n', state.normals, state.vertices) < 0
-    hidden_by_self = ~toward | (inside & (front < z - SELF_TOLERANCE_M))
-    gap = measured - z
-    margin = CLOTHES_M + 2 * observation.noise.sigma_m(z)
-    other = inside & ~observation.own[safe[:, 1], safe[:, 0]]
-    sight = np.full(len(z), int(Sight.VISIBLE))
-    with np.errstate(invalid='ignore'):
-        sight[gap > margin] = Sight.CONTRADICTED
-        # Another person's pixel hides what lies behind it, however close.
-        sight[(gap < -3 * margin) | (other & (gap < margin))] = Sight.SCENE_OCCLUDED
-    sight[np.isnan(measured)] = Sight.UNKNOWN
-    sight[hidden_by_self] = Sight.SELF_OCCLUDED
-    sight[~inside] = Sight.OUT_OF_IMAGE
+    rendered, camera = render_body(state, observation), observation.camera
+    margin = CLOTHES_M + 2 * observation.noise.sigma_m(state.vertices[:, 2])
+    sight, gap = np.empty(len(margin), dtype=np.int64), np.empty(len(margin))
+    see(state.vertices, state.normals, margin, camera.fx, camera.fy, camera.cx, camera.cy,
+        observation.depth_m, observation.own, rendered.depth_m, SELF_TOLERANCE_M, sight, gap)
     return Visibility(sight, gap, rendered)
 
 

@@ -38,6 +38,11 @@ class Residual:
         return Residual(self.r[:n], None if self.J is None else self.J[:n], self.w[:n])
 
 
+def no_residual(size: int) -> Residual:
+    """Return the block of a term that is switched off, of `size` parameters."""
+    return Residual(np.zeros(0), np.zeros((0, size)), np.zeros(0))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class NormalEquations:
     """The quadratic model of the cost: cost + gradient . step + 1/2 step' hessian step."""

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from pop_core.body.joint_limits import limit_residual
 from pop_core.fitting.body_state import BODY_POSE, BodyState, betas_slice
-from pop_core.fitting.levenberg_marquardt import Residual
+from pop_core.fitting.levenberg_marquardt import Residual, no_residual
 from pop_core.fitting.robust_loss import Kernel
 from pop_core.geometry.rotation import from_rotvec, left_jacobian_inverse, to_rotvec
 from pop_core.retrieval.candidate import PoseCandidate
@@ -28,8 +28,9 @@ def pose_prior_residual(
     state: BodyState, prior: PosePrior, weight: float, *, jacobian: bool
 ) -> Residual:
     """Return the whitened distance to the nearest component of the pose prior."""
-    r, J = prior.residual(state.parameters.body_pose)
-    return Residual(r, _at(state, J, BODY_POSE) if jacobian else None, np.full(len(r), weight))
+    r, J = prior.residual(state.parameters.body_pose, jacobian=jacobian)
+    return Residual(
+        r, None if J is None else _at(state, J, BODY_POSE), np.full(len(r), weight))
 
 
 def limit_prior_residual(state: BodyState, *, jacobian: bool) -> Residual:
@@ -64,6 +65,8 @@ def conditional_prior_residual(
     jacobian: bool,
 ) -> Residual:
     """Return the rotation from the retrieved pose, in units of the neighbours' spread."""
+    if weight == 0.0:
+        return no_residual(state.body.size)
     R = state.skeleton.R_local[1:]
     turn = to_rotvec(R @ from_rotvec(pose).transpose(0, 2, 1))
     r = (turn / sigma_rad[:, None]).reshape(-1)

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pop_core.fitting.body_state import BodyState
-from pop_core.fitting.levenberg_marquardt import Residual
+from pop_core.fitting.levenberg_marquardt import Residual, no_residual
 from pop_core.fitting.observation import KeypointRays
 from pop_core.fitting.robust_loss import Kernel
 from pop_core.keypoints.lifted_joints import LiftedJoints
@@ -34,6 +34,8 @@ def joint_residual(
 ) -> Residual:
     """Return E_J3D: offsets of the shared points from the lifted joints (Eq. 2)."""
     rows = np.flatnonzero(weight > 0)
+    if len(rows) == 0:
+        return no_residual(state.body.size)
     difference = (state.landmarks[rows] - lifted.positions_camera[rows]).reshape(-1)
     J = state.landmark_jacobian()[rows].reshape(-1, state.body.size) if jacobian else None
     return Residual(difference, J, np.repeat(weight[rows], 3))
@@ -58,6 +60,8 @@ def ray_residual(
     state: BodyState, rays: KeypointRays, weight: Float[np.ndarray, 's'], *, jacobian: bool
 ) -> Residual:
     """Return the distance of shared points to the rays of their keypoints, in two directions."""
+    if len(rays.joint) == 0:
+        return no_residual(state.body.size)
     distance = np.einsum('nkc,nc->nk', rays.across, state.landmarks[rays.joint])
     J = None
     if jacobian:
@@ -99,6 +103,32 @@ def join_pairs(parts: Sequence[Pairs]) -> Pairs:
         np.concatenate([part.target for part in parts]),
         np.concatenate([part.weight for part in parts]),
     )
+
+
+def merged_pairs(pairs: Pairs) -> tuple[Pairs, float]:
+    """Return one pair for all pairs of a vertex, and by how much less it costs.
+
+    Several measured points pull on one vertex along its one normal: sum w (n.x - n.t)^2 is
+    W (n.x - n.m)^2 plus what does not depend on x, with W = sum w and m the weighted mean of the
+    targets t. Gradient and curvature are the same, from a third of the rows.
+
+    Args:
+        pairs: Pairs whose direction is the same for all pairs of a vertex.
+    """
+    if len(pairs.vertex) == 0:
+        return pairs, 0.0
+    weight = np.bincount(pairs.vertex, pairs.weight)
+    vertex, first = np.unique(pairs.vertex, return_index=True)
+    known = weight[vertex] > 0.0
+    vertex, first = vertex[known], first[known]
+    target = np.column_stack([
+        np.bincount(pairs.vertex, pairs.weight * along)[vertex] for along in pairs.target.T])
+    target /= weight[vertex, None]
+    merged = Pairs(vertex, pairs.direction[first], target, weight[vertex])
+    mean = np.zeros((len(weight), 3))
+    mean[vertex] = target
+    apart = np.einsum('nc,nc->n', pairs.direction, pairs.target - mean[pairs.vertex])
+    return merged, 0.5 * float(np.dot(pairs.weight * apart, apart))
 
 
 def pair_residual(state: BodyState, pairs: Pairs, *, jacobian: bool) -> Residual:

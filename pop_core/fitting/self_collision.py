@@ -16,7 +16,7 @@ from pop_core.body.capsule_kernels import closest_shares
 from pop_core.body.capsules import BodyCapsules
 from pop_core.body.kinematics import attached_jacobian, attached_places
 from pop_core.fitting.body_state import BodyState, betas_slice
-from pop_core.fitting.levenberg_marquardt import Residual
+from pop_core.fitting.levenberg_marquardt import Residual, no_residual
 
 OVERLAP_SIGMA_M = 0.02
 
@@ -62,6 +62,8 @@ def collision_residual(state: BodyState, weight: float, *, jacobian: bool) -> Re
     The nearest points slide along their axes without changing the distance to first order, so the
     derivative holds them in place.
     """
+    if weight == 0.0:
+        return no_residual(state.body.size)
     overlaps = find_overlaps(state)
     w = np.full(len(overlaps.depth_m), weight / OVERLAP_SIGMA_M**2)
     J = _jacobian(state, overlaps) if jacobian else None

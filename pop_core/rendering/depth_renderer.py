@@ -30,20 +30,58 @@ class RenderedDepth:
 
 
 def render_depth(
-    vertices_camera: Float[np.ndarray, 'n 3'], f: Int[np.ndarray, 'm 3'], camera: Camera
+    vertices_camera: Float[np.ndarray, 'n 3'], f: Int[np.ndarray, 'm 3'], camera: Camera, *,
+    closed: bool = False,
 ) -> RenderedDepth:
     """Return the z-buffer of a mesh in the camera frame [m], seen by a pinhole.
 
     Lens distortion is ignored: images are undistorted before any rendering is compared with them.
+
+    Args:
+        vertices_camera: Vertices.
+        f: Triangles.
+        camera: The pinhole, outside of the mesh.
+        closed: Whether `is_closed` holds: then the faces that look away are hidden by others, and
+            half of the work is left out.
     """
     depth_m = np.full((camera.height, camera.width), np.inf, dtype=np.float32)
     face = np.full((camera.height, camera.width), -1, dtype=np.int32)
     depth_kernels.rasterize(
         np.ascontiguousarray(vertices_camera, dtype=np.float64),
         np.ascontiguousarray(f, dtype=np.int64),
-        camera.fx, camera.fy, camera.cx, camera.cy, depth_m, face,
+        camera.fx, camera.fy, camera.cx, camera.cy, closed, depth_m, face,
     )
     return RenderedDepth(depth_m, face)
+
+
+def render_parts(
+    vertices_camera: Float[np.ndarray, 'n 3'], f: Int[np.ndarray, 'm 3'],
+    part: Int[np.ndarray, 'm'], count: int, camera: Camera,
+) -> Float32[np.ndarray, 'p h w']:
+    """Return the z-buffer of each part of a mesh alone [m]; +inf where it is not seen.
+
+    Args:
+        vertices_camera: Vertices.
+        f: Triangles.
+        part: Part of each triangle, 0 to count - 1.
+        count: How many parts.
+        camera: The pinhole.
+    """
+    depth_m = np.full((count, camera.height, camera.width), np.inf, dtype=np.float32)
+    depth_kernels.rasterize_parts(
+        np.ascontiguousarray(vertices_camera, dtype=np.float64),
+        np.ascontiguousarray(f, dtype=np.int64), np.ascontiguousarray(part, dtype=np.int64),
+        camera.fx, camera.fy, camera.cx, camera.cy, depth_m)
+    return depth_m
+
+
+def is_closed(vertices: Float[np.ndarray, 'n 3'], f: Int[np.ndarray, 'm 3']) -> bool:
+    """Return whether a mesh is a surface without border whose faces look outward."""
+    edges = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]]).astype(np.int64)
+    there, back = (np.sort(edges[:, k] * len(vertices) + edges[:, 1 - k]) for k in (0, 1))
+    a, b, c = vertices[f].transpose(1, 0, 2)
+    volume = np.einsum('nc,nc->', a, np.cross(b, c))
+    return bool(np.array_equal(there, back) and (np.diff(there) > 0).all() and volume > 0.0)
 
 
 def vertex_normals(

@@ -12,6 +12,8 @@ from pop_core.rendering.depth_renderer import RenderedDepth
 from pop_core.segmentation import growth_kernels
 from pop_core.settings import setting
 
+NEAREST_M = 0.3  # people are not nearer
+
 
 @dataclass(frozen=True, slots=True)
 class SegmentationConfig:
@@ -49,17 +51,38 @@ def segment_body(
         focal_px: Focal length [px], which turns `growth_m` into pixels.
         config: Thresholds.
     """
-    covered = rendered.covered
-    if not covered.any():
-        return np.zeros(depth_m.shape, dtype=bool)
+    out = np.zeros(depth_m.shape, dtype=bool)
+    near = _near(rendered, config.growth_m * focal_px)
+    if near is None:
+        return out
+    rendered = RenderedDepth(rendered.depth_m[near], rendered.face[near])
+    covered, own = rendered.covered, own[near]
+    depth_m = np.ascontiguousarray(depth_m[near])
     distance_px, extended_m = _extend(rendered)
     with np.errstate(invalid='ignore'):
         similar = own & (np.abs(depth_m - extended_m) < config.tolerance_m)
     segment = similar & covered
-    reach_px = config.growth_m * focal_px / np.maximum(extended_m, 0.3)
+    reach_px = config.growth_m * focal_px / np.maximum(extended_m, NEAREST_M)
     allowed = similar & (distance_px <= reach_px)
     growth_kernels.grow(segment, allowed, depth_m, config.gamma_m)
-    return segment
+    out[near] = segment
+    return out
+
+
+def _near(rendered: RenderedDepth, growth: float) -> tuple[slice, slice] | None:
+    """Return the part of an image that a body's segment can reach; None where no body is.
+
+    Args:
+        rendered: Rendered depth of the body.
+        growth: How far the segment may grow [m px]: over depth, a number of pixels.
+    """
+    covered = rendered.covered
+    v, u = np.flatnonzero(covered.any(axis=1)), np.flatnonzero(covered.any(axis=0))
+    if len(v) == 0:
+        return None
+    reach_px = int(growth / max(float(rendered.depth_m.min()), NEAREST_M)) + 1
+    return (slice(max(v[0] - reach_px, 0), v[-1] + reach_px + 1),
+            slice(max(u[0] - reach_px, 0), u[-1] + reach_px + 1))
 
 
 def with_holes(
@@ -76,7 +99,10 @@ def with_holes(
         unmeasured: Pixels without depth that nobody else explains.
         rendered: Rendered depth of the body.
     """
-    together = segment | (unmeasured & rendered.covered)
+    holes = unmeasured & rendered.covered
+    if not holes.any():
+        return segment
+    together = segment | holes
     count, label = cv2.connectedComponents(together.astype(np.uint8), connectivity=4)
     touching = np.zeros(count, dtype=bool)
     touching[label[segment]] = True

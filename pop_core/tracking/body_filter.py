@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import lapack
 
 from pop_core.body.kinematics import increment, pose_skeleton
 from pop_core.body.model import BodyModel, BodyParameters
@@ -170,8 +170,14 @@ def _turned(
 def inverse(matrix: Float[np.ndarray, 'x x']) -> Float[np.ndarray, 'x x']:
     """Return the inverse of a symmetric positive definite matrix."""
     # Relative jitter: information of a metre and of a beta differ by orders of magnitude.
-    factor = cho_factor(matrix + 1e-9 * np.diag(np.diag(matrix)), check_finite=False)
-    return _symmetric(cho_solve(factor, np.eye(len(matrix)), check_finite=False))
+    jittered = matrix.copy()
+    jittered[np.diag_indices(len(matrix))] *= 1.0 + 1e-9
+    # A third of the work of solving for the unit matrix.
+    factor, failed = lapack.dpotrf(jittered, overwrite_a=1)
+    if failed:
+        raise np.linalg.LinAlgError(f'expected a positive definite matrix, found {matrix}')
+    upper = np.triu(lapack.dpotri(factor, overwrite_c=1)[0])
+    return np.asarray(upper + np.triu(upper, 1).T)
 
 
 def _symmetric(matrix: Float[np.ndarray, 'x x']) -> Float[np.ndarray, 'x x']:

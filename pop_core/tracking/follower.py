@@ -10,7 +10,6 @@ from jaxtyping import Bool
 from pop_core.estimate import BodyEstimate
 from pop_core.fitting.body_fit import BodyFit
 from pop_core.fitting.body_state import BodyState
-from pop_core.fitting.depth_consistency import Visibility, see_body
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.plausibility import plausibility
 from pop_core.fitting.uncertainty import joint_covariance
@@ -38,7 +37,7 @@ from pop_core.tracking.track import Alternative, PersonTrack
 from pop_core.tracking.track_view import observe_track
 from pop_core.tracking.tracked_energy import prior_curvature
 from pop_core.tracking.tracking_config import TrackingConfig
-from pop_core.tracking.warm_start import WarmFit, WarmStart, sighting, updated
+from pop_core.tracking.warm_start import SeenBody, WarmFit, WarmStart, sighting, updated
 
 MIN_SEEN = 0.04  # share of the body that must be seen for the frame to say anything of it
 CONTRADICTED = 0.4  # a body is not where the camera saw through this share of it
@@ -90,19 +89,19 @@ class Follower:
             lifted: The person's joints if they were detected in this frame.
             rival: A fit that knows nothing of the track, where the prediction is in doubt.
         """
-        start = self._body(track.filter)
+        body = self._body(track.filter)
         observation = observe_track(
-            scene.frame, scene.ground, scene.taken, start, track.joint_state, lifted,
+            scene.frame, scene.ground, scene.taken, body, track.joint_state, lifted,
             noise=scene.noise)
-        visibility = see_body(start, observation)
-        if sighting(visibility).seen < MIN_SEEN and lifted is None:
-            return self._coast(track, scene, start, visibility)
-        fit = self._fit(track, observation, lifted)
+        start = SeenBody.look(body, observation)
+        if sighting(start.visibility).seen < MIN_SEEN and lifted is None:
+            return self._coast(track, scene, start)
+        fit = self._fit(track, observation, lifted, start)
         if rival is not None:
             fit = self._better(track, fit, rival, observation)
         sight = sighting(fit.visibility)
         if sight.seen < MIN_SEEN or sight.contradicted > CONTRADICTED + sight.seen:
-            return self._coast(track, scene, start, visibility)
+            return self._coast(track, scene, start)
         return self._accept(track, scene, fit, lifted)
 
     def restart(
@@ -133,11 +132,12 @@ class Follower:
             for other in found.runners_up[: self.config.hypotheses - 1]]
 
     def _fit(
-        self, track: PersonTrack, observation: Observation, lifted: LiftedJoints | None
+        self, track: PersonTrack, observation: Observation, lifted: LiftedJoints | None,
+        start: SeenBody,
     ) -> WarmFit:
         """Return the best explanation of the person in a frame, and the belief it began with."""
         steps, detected = self.config.steps, lifted is not None
-        fit = self.warm.fit(track.filter, observation, steps, detected=detected)
+        fit = self.warm.fit(track.filter, observation, steps, detected=detected, start=start)
         if lifted is not None:
             fit = self._without_lost_limbs(track, fit, observation, lifted)
         if track.alternatives:
@@ -241,9 +241,10 @@ class Follower:
             track.doubts = track.doubts + 1 if track.is_doubtful or against else 0
 
     def _coast(
-        self, track: PersonTrack, scene: Scene, state: BodyState, visibility: Visibility
+        self, track: PersonTrack, scene: Scene, start: SeenBody
     ) -> BodyEstimate | None:
         """Return a person nothing is seen of, where they should be; None for the lost."""
+        state, visibility = start.state, start.visibility
         track.alternatives.clear()
         track.note_unseen(sighting(visibility).contradicted < CONTRADICTED, self.config)
         if not track.is_shown:

@@ -13,14 +13,14 @@ from itertools import pairwise
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int
+from jaxtyping import Bool, Float, Int
 
 from pop_core.body.joints import JOINT_NAMES, SHARED_INDEX
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.limb_points import KINDS
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import Pairs
-from pop_core.rendering.depth_renderer import render_depth
+from pop_core.rendering.depth_renderer import render_parts
 
 LIMBS = tuple(kind.joints for kind in KINDS)
 ARM_LIMBS = (0, 1)
@@ -62,13 +62,15 @@ class LimbClaims:
         self.observation = observation
         self.limb_of_vertex = LIMB_OF_BONE[state.body.main_bone]
         of_face = self.limb_of_vertex[state.body.faces].max(axis=1)
+        of_face[of_face < 0] = len(LIMBS)
         order = [-1, *np.argsort(doubt_m[ENDS], kind='stable').tolist()]
+        # The trunk, which belongs to no limb, is the last part.
+        alone_m = render_parts(
+            state.vertices, state.body.faces, of_face, len(LIMBS) + 1, observation.camera)
         surer = np.full(observation.depth_m.shape, np.inf, dtype=np.float32)
-        self._surer_m: dict[int, Float32[np.ndarray, 'h w']] = {}
+        self._surer_m = np.empty((len(LIMBS), *surer.shape), dtype=np.float32)
         for part, following in pairwise(order):
-            own = render_depth(
-                state.vertices, state.body.faces[of_face == part], observation.camera)
-            surer = np.minimum(surer, own.depth_m)
+            surer = np.minimum(surer, alone_m[part])
             self._surer_m[following] = cv2.erode(surer, np.ones((RIM_PX, RIM_PX), np.uint8))
 
     def weighed(self, pairs: Pairs) -> tuple[Pairs, Float[np.ndarray, '4']]:
@@ -80,9 +82,11 @@ class LimbClaims:
         limb_of_pair = self.limb_of_vertex[pairs.vertex]
         weight = pairs.weight.copy()
         of_limb = np.zeros(len(LIMBS))
-        for limb, surer_m in self._surer_m.items():
-            rows = np.flatnonzero(limb_of_pair == limb)
-            share = self._share(pairs.target[rows], surer_m)
+        every = np.flatnonzero(limb_of_pair >= 0)
+        shares = self._share(pairs.target[every], limb_of_pair[every])
+        for limb in range(len(LIMBS)):
+            own = limb_of_pair[every] == limb
+            rows, share = every[own], shares[own]
             left = weight[rows] * share
             few = share.sum() < FEWEST_POINTS or left.sum() < HIDDEN_SHARE * weight[rows].sum()
             weight[rows] = 0.0 if few and limb in ARM_LIMBS else left
@@ -90,11 +94,12 @@ class LimbClaims:
         return replace(pairs, weight=weight), of_limb
 
     def _share(
-        self, points: Float[np.ndarray, 'n 3'], surer_m: Float32[np.ndarray, 'h w']
+        self, points: Float[np.ndarray, 'n 3'], limb: Int[np.ndarray, 'n']
     ) -> Float[np.ndarray, 'n']:
-        """Return how little each point is explained by what is surer than the limb, 0..1."""
+        """Return how little each point is explained by what is surer than its limb, 0..1."""
         camera = self.observation.camera
         last = np.array([camera.width, camera.height]) - 1
         u, v = np.clip(np.rint(camera.project(points)), 0, last).astype(np.int64).T
         sigma_m = np.hypot(TRUNK_SIGMA_M, self.observation.noise.sigma_m(points[:, 2]))
-        return np.asarray(1.0 - np.exp(-0.5 * ((surer_m[v, u] - points[:, 2]) / sigma_m) ** 2))
+        apart = (self._surer_m[limb, v, u] - points[:, 2]) / sigma_m
+        return np.asarray(1.0 - np.exp(-0.5 * apart**2))

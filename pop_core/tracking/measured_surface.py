@@ -13,7 +13,7 @@ from pop_core.fitting.depth_consistency import HidingPlaces, Visibility, free_sp
 from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.fitting.ground_contact import ground_pairs
 from pop_core.fitting.observation import Observation
-from pop_core.fitting.residuals import Pairs, join_pairs
+from pop_core.fitting.residuals import Pairs, join_pairs, merged_pairs
 from pop_core.tracking.limb_claims import LimbClaims
 
 
@@ -26,11 +26,13 @@ class SurfaceTerms:
         n_measured: How many. The others only forbid: a limb that is pushed out of the open may be
             anywhere behind, so that they add nothing to what is known.
         of_limb: Weight of measured points that each of LIMBS claims.
+        spread: Cost of the measured points of one vertex lying apart, whatever the body does.
     """
 
     pairs: Pairs
     n_measured: int
     of_limb: Float[np.ndarray, '4']
+    spread: float
 
     def without(self, bones: Bool[np.ndarray, '24'], state: BodyState) -> SurfaceTerms:
         """Return the terms without those of some bones."""
@@ -39,7 +41,7 @@ class SurfaceTerms:
         return SurfaceTerms(
             Pairs(pairs.vertex[keep], pairs.direction[keep], pairs.target[keep],
                   pairs.weight[keep]),
-            int(keep[: self.n_measured].sum()), self.of_limb)
+            int(keep[: self.n_measured].sum()), self.of_limb, self.spread)
 
 
 def surface_terms(
@@ -65,9 +67,10 @@ def surface_terms(
     measured, of_limb = claims.weighed(join_pairs([
         match_points(state, visibility, points, labels, scale_m, observation.noise),
         match_vertices(state, visibility, scale_m, observation.noise)]))
+    measured, spread = merged_pairs(measured)
     parts = [measured]
     if config.free_space:
         parts.append(free_space_pairs(state, visibility, places))
     if observation.ground is not None:
         parts.append(ground_pairs(state, observation.ground, observation.lifted))
-    return SurfaceTerms(join_pairs(parts), len(measured.vertex), of_limb)
+    return SurfaceTerms(join_pairs(parts), len(measured.vertex), of_limb, spread)

@@ -61,6 +61,24 @@ def sighting(visibility: Visibility) -> Sighting:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class SeenBody:
+    """A body and how the camera sees it.
+
+    Args:
+        state: The body on the coarse mesh.
+        visibility: Sight of its vertices.
+    """
+
+    state: BodyState
+    visibility: Visibility
+
+    @classmethod
+    def look(cls, state: BodyState, observation: Observation) -> SeenBody:
+        """Return a body as an observation sees it."""
+        return cls(state, see_body(state, observation))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class WarmFit:
     """A body followed into a frame.
 
@@ -103,7 +121,7 @@ class WarmStart:
 
     def fit(
         self, predicted: FilterState, observation: Observation, steps: int, *, detected: bool,
-        loose: Bool[np.ndarray, '24'] | None = None,
+        loose: Bool[np.ndarray, '24'] | None = None, start: SeenBody | None = None,
     ) -> WarmFit:
         """Return the body after some steps from a prediction.
 
@@ -114,8 +132,11 @@ class WarmStart:
             steps: How many steps.
             detected: Whether the observation holds keypoints of this frame.
             loose: Limbs that follow keypoints alone until the last steps.
+            start: The predicted body as it is seen, where that is known already.
         """
-        state = self.fitter.coarse.state(predicted.parameters)
+        start = start or SeenBody.look(
+            self.fitter.coarse.state(predicted.parameters), observation)
+        state, visibility = start.state, start.visibility
         prediction = Prediction(predicted, state)
         weights = TermWeights(
             JOINTS_WEIGHT if detected else 0.0, self.fitter.config.prior_weight, 0.0)
@@ -127,7 +148,6 @@ class WarmStart:
             NOISE_SIGMAS * observation.noise.sigma_m(state.joints[:1, 2]))
         damping = FIRST_DAMPING
         active = np.ones(state.body.size, dtype=bool)
-        visibility = see_body(state, observation)
         segment = self.fitter.steps.segment(visibility.rendered, observation)
         places = HidingPlaces(observation, segment, state.vertices[:, 2])
         for k, scale_m in enumerate(scales_m):
@@ -147,7 +167,7 @@ class WarmStart:
         curvature, blocks = energy.curvature(state)
         energies = {
             'E_J3D': cost_of(blocks[:1]), 'E_prior': cost_of(blocks[PRIOR_BLOCKS]),
-            'E_NN': cost_of(blocks[PAIR_BLOCKS]),
+            'E_NN': cost_of(blocks[PAIR_BLOCKS]) + surface.spread,
             'E_depth': depth_energy(visibility.rendered, observation, segment),
         }
         return WarmFit(state, visibility, segment, curvature, energies, surface.of_limb)

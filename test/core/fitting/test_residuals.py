@@ -7,6 +7,7 @@ from support.one_person import CAMERA, lift_truth
 
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.fitting.body_state import BodyState, FitBody
+from pop_core.fitting.levenberg_marquardt import assemble, cost_of
 from pop_core.fitting.observation import keypoint_rays
 from pop_core.fitting.priors import (
     conditional_prior_residual,
@@ -14,7 +15,15 @@ from pop_core.fitting.priors import (
     pose_prior_residual,
     shape_prior_residual,
 )
-from pop_core.fitting.residuals import Pairs, joint_residual, pair_residual, ray_residual
+from pop_core.fitting.residuals import (
+    Pairs,
+    joint_residual,
+    merged_pairs,
+    no_pairs,
+    pair_residual,
+    ray_residual,
+)
+from pop_core.fitting.self_collision import collision_residual
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.retrieval.pose_prior import load_pose_prior
 
@@ -49,6 +58,46 @@ def test_surface_term(state: BodyState) -> None:
     vertex = rng.integers(0, len(state.vertices), 40)
     pairs = Pairs(vertex, rng.normal(size=(40, 3)), rng.normal(size=(40, 3)), np.ones(40))
     assert_is_derivative(lambda s, j: pair_residual(s, pairs, jacobian=j), state)
+
+
+def test_pairs_of_one_vertex_are_worth_one_at_their_mean(state: BodyState) -> None:
+    rng = np.random.default_rng(5)
+    vertex = rng.integers(0, 50, 400)
+    weight = np.where(vertex == vertex[0], 0.0, rng.uniform(0.0, 100.0, 400))
+    every = Pairs(vertex, state.normals[vertex], rng.normal(size=(400, 3)), weight)
+    merged, spread = merged_pairs(every)
+    assert len(merged.vertex) == len(np.unique(vertex)) - 1  # a vertex without weight says nothing
+    size = state.body.size
+    moved = state.moved(0.01 * rng.normal(size=size))
+    for at in (state, moved):
+        many, few = (assemble([pair_residual(at, p, jacobian=True)], size)
+                     for p in (every, merged))
+        np.testing.assert_allclose(few.gradient, many.gradient, rtol=1e-9, atol=1e-6)
+        np.testing.assert_allclose(few.hessian, many.hessian, rtol=1e-9, atol=1e-6)
+        assert few.cost + spread == pytest.approx(many.cost, rel=1e-9)
+
+
+def test_no_pairs_merge_to_none() -> None:
+    merged, spread = merged_pairs(no_pairs())
+    assert len(merged.vertex) == 0
+    assert spread == 0.0
+
+
+def test_a_term_without_weight_is_an_empty_block(
+    state: BodyState, person: BodyParameters, lifted: LiftedJoints
+) -> None:
+    sigma = np.full(23, 0.3)
+    rays = keypoint_rays(lifted, CAMERA)
+    assert len(rays.joint) == 0
+    for block in (
+        joint_residual(state, lifted, np.zeros(15), jacobian=True),
+        ray_residual(state, rays, np.zeros(15), jacobian=True),
+        conditional_prior_residual(state, person.body_pose, sigma, 0.0, jacobian=True),
+        collision_residual(state, 0.0, jacobian=True),
+    ):
+        assert len(block.r) == 0
+        assert cost_of([block]) == 0.0
+        assert not assemble([block], state.body.size).hessian.any()
 
 
 def test_conditional_prior(state: BodyState, person: BodyParameters) -> None:

@@ -1,7 +1,16 @@
 import numpy as np
+import pytest
+from support.one_person import facing_person
 
+from pop_core.body.default_body import default_body
+from pop_core.fitting.body_state import FitBody
 from pop_core.geometry.camera import Camera
-from pop_core.rendering.depth_renderer import render_depth, vertex_normals
+from pop_core.rendering.depth_renderer import (
+    is_closed,
+    render_depth,
+    render_parts,
+    vertex_normals,
+)
 
 CAMERA = Camera(80, 60, 70.0, 70.0, 39.5, 29.5)
 
@@ -38,6 +47,38 @@ def test_the_nearer_of_two_surfaces_is_seen_in_either_order() -> None:
 def test_what_lies_behind_the_camera_is_not_drawn() -> None:
     behind = slanted() * [1, 1, -1]
     assert not render_depth(behind, np.array([[0, 1, 2]]), CAMERA).covered.any()
+
+
+@pytest.mark.parametrize('full', [True, False])
+def test_of_a_closed_body_the_faces_that_look_away_are_never_seen(
+    full: bool,
+) -> None:
+    state = FitBody(default_body(), full=full).state(facing_person(np.zeros(10)))
+    assert state.body.is_closed
+    every = render_depth(state.vertices, state.body.faces, CAMERA)
+    half = render_depth(state.vertices, state.body.faces, CAMERA, closed=True)
+    assert every.covered.any()
+    np.testing.assert_array_equal(half.depth_m, every.depth_m)
+    np.testing.assert_array_equal(half.face, every.face)
+
+
+def test_a_surface_with_a_border_or_turned_inside_out_is_not_closed() -> None:
+    v, f = default_body().v_template.astype(np.float64), default_body().f
+    assert is_closed(v, f)
+    assert not is_closed(v, f[1:])
+    assert not is_closed(v, f[:, ::-1])
+    assert not is_closed(v, np.vstack([f, f[:1]]))
+    assert not is_closed(v, np.vstack([f[1:], f[:1, ::-1]]))
+
+
+def test_parts_are_seen_as_each_alone() -> None:
+    state = FitBody(default_body(), full=False).state(facing_person(np.zeros(10)))
+    faces = state.body.faces
+    part = np.random.default_rng(0).integers(0, 3, len(faces))
+    together = render_parts(state.vertices, faces, part, 3, CAMERA)
+    for k in range(3):
+        alone = render_depth(state.vertices, faces[part == k], CAMERA)
+        np.testing.assert_array_equal(together[k], alone.depth_m)
 
 
 def test_normals_of_a_cube_point_along_its_diagonals() -> None:

@@ -37,6 +37,17 @@ def test_growth_stays_near_the_silhouette_on_a_surface_that_goes_on() -> None:
     assert columns.max() <= 47 + reach_px
 
 
+def test_pixels_far_from_the_body_change_nothing() -> None:
+    depth, rendered, _ = scene(wall_m=2.01)
+    wide = segment_body(depth, rendered, EVERY, FOCAL_PX, CONFIG)
+    part = (slice(2, 58), slice(20, 60))
+    narrow = segment_body(
+        depth[part], RenderedDepth(rendered.depth_m[part], rendered.face[part]), EVERY[part],
+        FOCAL_PX, CONFIG)
+    np.testing.assert_array_equal(wide[part], narrow)
+    assert wide.sum() == narrow.sum()
+
+
 def test_an_occluder_in_front_is_not_the_body() -> None:
     depth, rendered, truth = scene()
     depth[30:50] = 1.0
