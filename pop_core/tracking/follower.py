@@ -33,6 +33,7 @@ from pop_core.tracking.limbs import contradicted_joints, loosened, lost_limbs
 from pop_core.tracking.liveliness import followed_trail, liveliness
 from pop_core.tracking.motion import N_MOVING
 from pop_core.tracking.rivals import costs, follow_alternatives
+from pop_core.tracking.sides import misnamed_joints, renamed, without_joints
 from pop_core.tracking.track import Alternative, PersonTrack
 from pop_core.tracking.track_view import observe_track
 from pop_core.tracking.tracked_energy import prior_curvature
@@ -90,6 +91,9 @@ class Follower:
             rival: A fit that knows nothing of the track, where the prediction is in doubt.
         """
         body = self._body(track.filter)
+        if lifted is not None:
+            track.misnamed = misnamed_joints(body.landmarks, lifted)
+            lifted = renamed(lifted, track.misnamed)
         observation = observe_track(
             scene.frame, scene.ground, scene.taken, body, track.joint_state, lifted,
             noise=scene.noise)
@@ -98,7 +102,7 @@ class Follower:
             return self._coast(track, scene, start)
         fit = self._fit(track, observation, lifted, start)
         if rival is not None:
-            fit = self._better(track, fit, rival, observation)
+            fit = self._better(track, fit, rival, without_joints(observation, track.misnamed))
         sight = sighting(fit.visibility)
         if sight.seen < MIN_SEEN or sight.contradicted > CONTRADICTED + sight.seen:
             return self._coast(track, scene, start)
@@ -237,7 +241,7 @@ class Follower:
             track.depth_level = (1.0 - USUAL_SHARE) * usual_m + USUAL_SHARE * depth_m
         track.is_doubtful = unusual or support < TRUSTED_SUPPORT
         if lifted is not None:
-            against = contradicted_joints(fit.state, lifted).any()
+            against = contradicted_joints(fit.state, lifted).any() or track.misnamed.any()
             track.doubts = track.doubts + 1 if track.is_doubtful or against else 0
 
     def _coast(

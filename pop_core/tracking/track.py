@@ -7,11 +7,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pop_core.body.joints import N_JOINTS
+from pop_core.body.joints import N_JOINTS, N_SHARED
 from pop_core.body.model import BodyParameters
 from pop_core.estimate import BodyEstimate, JointState, Track, TrackState
 from pop_core.tracking.body_filter import FilterState
 from pop_core.tracking.tracking_config import TrackingConfig
+
+
+def _no_joints() -> Bool[np.ndarray, '15']:
+    return np.zeros(N_SHARED, dtype=bool)
 
 
 @dataclass(slots=True, eq=False)
@@ -49,6 +53,7 @@ class PersonTrack:
         misses: Looks for people, one after the other, that did not find a person who was seen.
         doubts: Detections, one after the other, after which something was still wrong.
         is_doubtful: Whether something was wrong in the last frame.
+        misnamed: Shared joints whose left and right were exchanged at the last detection.
         restarted_ns: When the body was last looked for anew.
         trail: Where the joints were of late, None before the second frame [m].
         depth_level: E_depth that is usual for this person [m].
@@ -71,6 +76,7 @@ class PersonTrack:
     misses: int = 0
     doubts: int = 0
     is_doubtful: bool = False
+    misnamed: Bool[np.ndarray, '15'] = field(default_factory=_no_joints)
     restarted_ns: int = 0
     trail: Float[np.ndarray, '24 3'] | None = None
     depth_level: float | None = None
