@@ -1,16 +1,17 @@
 """Left and right of keypoints: exchanged ones are taken for what they are, all others left."""
 
+from dataclasses import replace
+
 import numpy as np
-import pytest
-from support.one_person import lift_truth
-from support.stage import Scripted, Stage, only
+from support.one_person import CAMERA, lift_truth, photograph
 
-from pop_core.body.joints import SHARED_MIRROR, SHARED_NAMES
-from pop_core.body.kinematics import attached_positions, joints
+from pop_core.body.joints import SHARED_INDEX, SHARED_NAMES
+from pop_core.body.kinematics import attached_positions
 from pop_core.body.model import BodyModel, BodyParameters, shared_points
-from pop_core.keypoints.detection import Detection
-from pop_core.tracking.sides import misnamed_joints, renamed
+from pop_core.fitting.observation import observe
+from pop_core.tracking.sides import misnamed_joints, renamed, without_joints
 
+HEAD = SHARED_INDEX['head']
 ARMS = np.array([name.endswith(('shoulder', 'elbow', 'wrist')) for name in SHARED_NAMES])
 
 
@@ -47,20 +48,17 @@ def test_one_wrong_wrist_exchanges_nothing(body: BodyModel, person: BodyParamete
     assert not misnamed_joints(points(body, person), lifted).any()
 
 
-def test_a_detector_that_takes_left_for_right_for_a_moment_turns_nobody_round(
-    body: BodyModel, person: BodyParameters, monkeypatch: pytest.MonkeyPatch
+def test_joints_that_are_left_out_say_nothing_and_others_what_they_said(
+    body: BodyModel, person: BodyParameters
 ) -> None:
-    stage = Stage(body)
-    stage.show(person, times=10)
-    detection = Scripted.detection
-
-    def exchanged(self: Scripted, *args: object) -> Detection:
-        found = detection(self, *args)
-        return Detection(
-            found.keypoints_px[SHARED_MIRROR], found.scores[SHARED_MIRROR], found.box_px)
-
-    with monkeypatch.context() as confused:
-        confused.setattr(Scripted, 'detection', exchanged)
-        found = only(stage.show(person, times=8))
-    off = np.linalg.norm(found.joints - joints(body, person), axis=1)
-    assert off.max() < 0.1
+    lifted = lift_truth(body, person, hidden=(HEAD,))
+    pixels = lifted.keypoints_px.copy()
+    pixels[HEAD] = CAMERA.project(points(body, person))[HEAD]
+    guessed = replace(lifted, keypoints_px=pixels, scores=np.full(15, 0.5))
+    nobody = np.zeros((CAMERA.height, CAMERA.width), dtype=bool)
+    seen = observe(photograph(body, person), guessed, nobody)
+    np.testing.assert_array_equal(seen.keypoint_rays.joint, [HEAD])
+    rest = without_joints(seen, ARMS)
+    np.testing.assert_array_equal(rest.lifted.lifted, seen.lifted.lifted & ~ARMS)
+    np.testing.assert_array_equal(rest.keypoint_rays.joint, [HEAD])
+    assert len(without_joints(seen, ~ARMS).keypoint_rays.score) == 0
