@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 
@@ -14,6 +14,11 @@ class Stopwatch:
         """Start with nothing measured."""
         self.times_ms: dict[str, float] = {}
 
+    def add(self, times_ms: Mapping[str, float]) -> None:
+        """Add what another stopwatch measured."""
+        for name, spent in times_ms.items():
+            self.times_ms[name] = self.times_ms.get(name, 0.0) + spent
+
     @contextmanager
     def step(self, name: str) -> Iterator[None]:
         """Measure the enclosed block under a name."""
@@ -21,5 +26,4 @@ class Stopwatch:
         try:
             yield
         finally:
-            spent = 1e3 * (time.perf_counter() - start)
-            self.times_ms[name] = self.times_ms.get(name, 0.0) + spent
+            self.add({name: 1e3 * (time.perf_counter() - start)})

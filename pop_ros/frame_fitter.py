@@ -17,6 +17,7 @@ from pop_core.tracking.tracker import BodyTracker
 from pop_ros.body_messages import RECORDED_TYPES, BodyMessages, Output
 from pop_ros.frame_maker import FrameMaker
 from pop_ros.keypoint_sources import apply_settings
+from pop_ros.looking_thread import AnswerT, LookingThread
 from pop_ros.node_config import NodeConfig
 from pop_ros.sources import make_pipeline
 from pop_ros.static_frames import StaticFrames, parse_extrinsics
@@ -47,7 +48,9 @@ class FrameFitter:
         config: NodeConfig,
         progress: Callable[[float, str], None] | None = None,
         frames: StaticFrames | None = None,
+        *,
         background: BackgroundFinder | None = None,
+        looking: LookingThread | None = None,
     ) -> None:
         """Load body model and pose library, and compile kernels.
 
@@ -58,13 +61,15 @@ class FrameFitter:
             progress: Told a share 0..1 and a sentence while a first library is generated.
             frames: Knows where a depth camera with a frame of its own stands.
             background: Finds people anew while others are followed; None lets frames wait.
+            looking: Asks the keypoint source while people are followed; None lets frames wait.
 
         Raises:
             PopError: If one of them cannot be loaded.
         """
         apply_settings(detector, pipeline_config)
+        self._looking = looking
         self._pipeline = make_pipeline(detector, pipeline_config, progress=progress)
-        self._tracker = BodyTracker(self._pipeline, config.tracking, background)
+        self._tracker = BodyTracker(self._pipeline, config.tracking, background, looking)
         self._messages = BodyMessages(self._pipeline.model, config)
         self._maker = FrameMaker(frames or StaticFrames())
         self._maker.extrinsics = parse_extrinsics(config.depth.extrinsics)
@@ -77,7 +82,7 @@ class FrameFitter:
     def configure(self, pipeline_config: PipelineConfig, config: NodeConfig) -> None:
         """Take over changed settings; model, library and keypoint source stay loaded."""
         old = self._pipeline
-        apply_settings(old.detector, pipeline_config)
+        self._ask(lambda: apply_settings(old.detector, pipeline_config))
         self._pipeline = BodyPipeline(
             old.model, old.library, old.detector, pipeline_config, old.fitter.prior)
         self._tracker.configure(self._pipeline, config.tracking)
@@ -99,7 +104,7 @@ class FrameFitter:
         Raises:
             PopError: If the keypoint source cannot read what it needs for this frame.
         """
-        return self._pipeline.detector.detect(frame)
+        return self._ask(lambda: self._pipeline.detector.detect(frame))
 
     def fit(
         self, color: Any, depth: Any, info: Any, depth_info: Any = None,
@@ -126,3 +131,7 @@ class FrameFitter:
             result = self._pipeline.process(frame)
         outputs = self._messages.stream(result, frame, color.header.frame_id, wanted)
         return FittedFrame(frame, result, outputs)
+
+    def _ask(self, question: Callable[[], AnswerT]) -> AnswerT:
+        """Return the answer to a question about the keypoint source, which hears one at a time."""
+        return question() if self._looking is None else self._looking.submit(question).result()

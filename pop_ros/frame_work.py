@@ -17,6 +17,7 @@ from pop_ros.finding_process import FindingProcess
 from pop_ros.frame_fitter import FittedFrame, FrameFitter
 from pop_ros.from_messages import stamp_ns
 from pop_ros.inputs import RgbdMessages
+from pop_ros.looking_thread import LookingThread
 from pop_ros.node_config import NodeConfig
 from pop_ros.node_outputs import NodeOutputs
 from pop_ros.parameters import ConfigParameters
@@ -53,7 +54,7 @@ class FrameWork:
         self._latest: FittedFrame | None = None
         self._last_number = 0
         self._said_share = -1.0
-        self._finding = FindingProcess()
+        self._finding, self._looking = FindingProcess(), LookingThread()
         self._worker: Worker[RgbdMessages] = Worker(
             self._fit, self._on_error, lambda: self._prepare(detector, frames))
         self._worker.start()
@@ -105,6 +106,7 @@ class FrameWork:
             self._statistics.add_drop(STOPPED)
         finished = self._worker.stop(timeout_s)
         self._finding.stop()
+        self._looking.stop()
         return finished
 
     # Worker thread
@@ -116,7 +118,7 @@ class FrameWork:
             'ones read them from the cache')
         fitter = FrameFitter(
             detector, self._settings.pipeline_config, self._settings.node_config,
-            self._say_progress, frames, self._finding)
+            self._say_progress, frames, background=self._finding, looking=self._looking)
         self._outputs.publish_model(fitter.model)
         self._configure_finding()
         self._fitter = fitter

@@ -46,7 +46,7 @@ class DetectionSchedule:
 
     def is_due(
         self, tracks: Sequence[PersonTrack], gap: Gap, *, is_busy: bool = False,
-        is_late: bool = False,
+        is_late: bool = False, is_looking: bool = False,
     ) -> bool:
         """Return whether to look for people in this frame; if so, it counts as done.
 
@@ -55,9 +55,10 @@ class DetectionSchedule:
             gap: Time since the last frame.
             is_busy: Whether somebody is being fitted, so that nobody else can begin.
             is_late: Whether a body comes in that was fitted to a frame of some time ago.
+            is_looking: Whether a look at an earlier frame is still being made.
         """
         self._frames_since += 1
-        if not tracks and is_busy and not is_late:
+        if is_looking or (not tracks and is_busy and not is_late):
             return False
         every = self._config.detect_every
         if any(_needs_a_look(track) for track in tracks):

@@ -1,12 +1,14 @@
-"""Beliefs of a frame of some time ago, moved on to the present one: a fit takes its time."""
+"""What belongs to a frame of some time ago, moved on to the present one: fits take their time."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 
 from pop_core.fitting.body_state import FitBody
+from pop_core.geometry.camera import Camera
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.tracking.body_filter import FilterState, predict
 
@@ -45,3 +47,21 @@ def caught_up(
     velocity[:3] += step / late_s
     parameters = predicted.parameters.replaced(transl=predicted.parameters.transl + step)
     return replace(predicted, velocity=velocity, parameters=parameters)
+
+
+def carried(
+    lifted: LiftedJoints, there: Float[np.ndarray, 's 3'], here: Float[np.ndarray, 's 3'],
+    camera: Camera,
+) -> LiftedJoints:
+    """Return joints that were lifted in an earlier frame, moved as far as their body has.
+
+    Args:
+        lifted: The joints.
+        there: Shared points of the body in that frame [m].
+        here: The same by now [m].
+        camera: Camera of both, without distortion.
+    """
+    across_px = camera.project(here) - camera.project(there)
+    return replace(
+        lifted, positions_camera=lifted.positions_camera + (here - there),
+        keypoints_px=lifted.keypoints_px + across_px)

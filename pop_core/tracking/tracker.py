@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 from threadpoolctl import ThreadpoolController
 
-from pop_core.depth_noise import USUAL_NOISE, estimate_depth_noise
+from pop_core.depth_noise import USUAL_NOISE
 from pop_core.estimate import BodyEstimate, EstimateStatus, FrameResult, TrackState
 from pop_core.geometry.camera import Camera
-from pop_core.keypoints.undistortion import undistort_detection
 from pop_core.pipeline import BodyPipeline, Scene
 from pop_core.rgbd import RgbdFrame, distort_mask, undistort_frame
-from pop_core.segmentation.ground import Ground, find_ground
+from pop_core.segmentation.ground import Ground
 from pop_core.stopwatch import Stopwatch
-from pop_core.tracking.association import Expected, associate, behind_others, offset_m
+from pop_core.tracking.association import Expected, associate, behind_others
 from pop_core.tracking.body_filter import first_state
 from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, Gap
 from pop_core.tracking.doubts import STALE_S, count_misses, is_doubtful, is_settled, is_stale
-from pop_core.tracking.finder import Finder, Found
+from pop_core.tracking.finder import Finder
 from pop_core.tracking.follower import Follower
 from pop_core.tracking.fresh_fits import BackgroundFinder, FreshFit, FreshFits
+from pop_core.tracking.looks import Glimpse, Look, Lookout, Looks, look_for_people
 from pop_core.tracking.track import PersonTrack, new_track
 from pop_core.tracking.tracking_config import TrackingConfig
 
@@ -33,15 +35,16 @@ class BodyTracker:
 
     def __init__(
         self, pipeline: BodyPipeline, config: TrackingConfig | None = None,
-        background: BackgroundFinder | None = None,
+        background: BackgroundFinder | None = None, lookout: Lookout | None = None,
     ) -> None:
         """Prepare to follow people with a pipeline's model, detector and settings.
 
-        Given somebody who finds people anew meanwhile, nobody waits for that but the person, as
-        camera rate asks for; without, frames give the same bodies on any machine.
+        Given somebody who finds people anew meanwhile, and somebody who looks for them, nobody
+        waits for that but the person, as camera rate asks for; without, frames give the same
+        bodies on any machine.
         """
         self._blas = ThreadpoolController()
-        self._fresh = FreshFits(background)
+        self._fresh, self._looks = FreshFits(background), Looks(lookout)
         self._next_id = 0
         self._tracks: list[PersonTrack] = []
         self._gap = Gap(0.0)
@@ -90,8 +93,9 @@ class BodyTracker:
         is_late = is_late or (
             self._gap.is_long and any(track.has_just_begun for track in self._tracks))
         with self._blas.limit(limits=1, user_api='blas'):
-            found = self._look(frame, seen, watch, is_late=is_late)
-            bodies, statuses = self._track(seen, found, watch)
+            look = self._look(frame, seen, watch, is_late=is_late)
+            bodies, statuses = self._track(seen, look, watch)
+            self._looks.remember(self._places)
         bodies = [replace(b, mask=distort_mask(b.mask, frame.camera)) for b in bodies]
         bodies.sort(key=lambda body: float(body.joints[0, 2]))
         return FrameResult(tuple(bodies), tuple(statuses), watch.times_ms)
@@ -99,6 +103,7 @@ class BodyTracker:
     def _forget(self) -> None:
         self._tracks.clear()
         self._fresh.forget()
+        self._looks.forget()
         self._refused = None
         self._last, self._ground = None, None
         self._schedule = DetectionSchedule(self.config)
@@ -111,54 +116,62 @@ class BodyTracker:
 
     def _look(
         self, frame: RgbdFrame, seen: RgbdFrame, watch: Stopwatch, *, is_late: bool
-    ) -> Found | None:
+    ) -> Look | None:
         """Return the people a detector sees, or None in frames that do without."""
-        if not self._schedule.is_due(
-                self._tracks, self._gap, is_busy=self._fresh.is_busy, is_late=is_late):
-            return None
-        with watch.step('detect'):
-            detections = self.pipeline.detector.detect(frame)
-        with watch.step('lift'):
-            found = self._finder.lift(
-                seen, [undistort_detection(d, frame.camera) for d in detections])
-        with watch.step('ground'):
-            self._ground = find_ground(seen) if self.pipeline.config.use_ground else None
-            self._noise = estimate_depth_noise(seen.depth_m)
-        return found
+        look = self._looks.take()
+        wait = is_late or not self._tracks or self._gap.is_of_slow_camera
+        if self._schedule.is_due(
+                self._tracks, self._gap, is_busy=self._fresh.is_busy, is_late=is_late,
+                is_looking=self._looks.is_busy and not wait):
+            pipeline = self.pipeline
+            look = self._looks.look(
+                lambda: look_for_people(pipeline, frame, seen), wait=wait) or look
+        if look is not None:
+            watch.add(look.times_ms)
+            self._ground, self._noise = look.ground, look.noise
+        return look
+
+    def _places(self) -> dict[int, Float[np.ndarray, 's 3']]:
+        return {track.id: self._follower.expected(track).points for track in self._tracks}
 
     def _track(
-        self, frame: RgbdFrame, looked: Found | None, watch: Stopwatch
+        self, frame: RgbdFrame, look: Look | None, watch: Stopwatch
     ) -> tuple[list[BodyEstimate], list[EstimateStatus]]:
         """Follow everybody known, nearest first, then begin with whoever is new."""
-        found = Found() if looked is None else looked
         with watch.step('predict'):
             for track in self._tracks:
                 self._follower.predict(track, frame.stamp_ns)
             expected = behind_others([self._expected(track) for track in self._tracks])
-            matches = associate(
-                expected, found.detections, found.lifted, self.config.gate_m)
+            matches = {} if look is None else self._matches(look, expected)
         scene = Scene(
             frame, self._ground, self._noise, np.zeros(frame.depth_m.shape, dtype=bool))
         bodies: list[BodyEstimate] = []
         for row in np.argsort([t.filter.parameters.transl[2] for t in self._tracks]).tolist():
-            track, index = self._tracks[row], matches.get(row)
-            if looked is not None:
-                count_misses(track, index is not None)
-            astray = index is not None and offset_m(
-                expected[row], found.lifted[index]) > self.config.gate_m
-            estimate = self._continue(track, scene, found, index, watch, astray=astray)
+            track, glimpse = self._tracks[row], matches.get(row)
+            if look is not None:
+                count_misses(track, glimpse is not None)
+            estimate = self._continue(track, scene, glimpse, expected[row], watch)
             if estimate is not None:
                 bodies.append(estimate)
                 scene = replace(scene, taken=scene.taken | estimate.mask)
-        statuses = [EstimateStatus.OK for _ in found.detections]
-        for index in found.nearest_first(set(matches.values())):
-            statuses[index], estimate = self._begin(scene, found, index, watch)
-            if estimate is not None:
-                bodies.append(estimate)
-                scene = replace(scene, taken=scene.taken | estimate.mask)
+        statuses = []
+        if look is not None:
+            statuses = [EstimateStatus.OK for _ in look.found.detections]
+            for index in look.found.nearest_first({seen.index for seen in matches.values()}):
+                statuses[index], estimate = self._begin(scene, Glimpse(look, index), watch)
+                if estimate is not None:
+                    bodies.append(estimate)
+                    scene = replace(scene, taken=scene.taken | estimate.mask)
         self._tracks = [t for t in self._tracks if not t.has_ended(self.config)]
         self._fresh.forget_unless({track.id for track in self._tracks})
         return bodies, statuses
+
+    def _matches(self, look: Look, expected: Sequence[Expected]) -> dict[int, Glimpse]:
+        """Return what a look saw of those who are followed."""
+        people = zip(self._tracks, expected, strict=True)
+        then = [look.then(track.id, place) for track, place in people]
+        found = associate(then, look.found.detections, look.found.lifted, self.config.gate_m)
+        return {row: Glimpse(look, index) for row, index in found.items()}
 
     def _expected(self, track: PersonTrack) -> Expected:
         """Return where a person should be; who was just found or is contradicted may be elsewhere.
@@ -171,19 +184,20 @@ class BodyTracker:
         return replace(expected, doubt_m=max(expected.doubt_m, ASTRAY_M))
 
     def _continue(
-        self, track: PersonTrack, scene: Scene, found: Found, index: int | None,
-        watch: Stopwatch, *, astray: bool,
+        self, track: PersonTrack, scene: Scene, glimpse: Glimpse | None, expected: Expected,
+        watch: Stopwatch,
     ) -> BodyEstimate | None:
         """Return a known person in this frame, or None where nothing is given out."""
         lifted, elsewhere = None, is_stale(track)
         fresh = self._fresh.take(track.id)
-        if index is not None:
-            lifted = self._finder.lifted_behind(scene, found, index)
+        if glimpse is not None:
+            lifted = glimpse.joints(self._finder, scene.taken, track.id, expected)
+            astray = glimpse.offset_m(track.id, expected) > self.config.gate_m
             elsewhere = elsewhere or astray
             late_s = self._late_s(track)
             if fresh is None and late_s == 0.0 and (elsewhere or is_doubtful(track, self._gap)):
                 with watch.step('restart'):
-                    self._ask(scene, found, index, track.id)
+                    self._ask(scene, glimpse, track.id)
                 fresh = self._fresh.take(track.id)
                 if elsewhere and self._fresh.is_busy:
                     late_s = max(track.unseen_s, STALE_S)
@@ -202,20 +216,20 @@ class BodyTracker:
         is_late = track.has_just_begun and track.gap_s > LONG_GAP_S
         return track.gap_s if is_late and not self._gap.is_of_slow_camera else 0.0
 
-    def _ask(self, scene: Scene, found: Found, index: int, number: int | None = None) -> None:
+    def _ask(self, scene: Scene, glimpse: Glimpse, number: int | None = None) -> None:
         """Have a detected person fitted from retrieved poses; wait where nobody is known."""
         self._fresh.ask(
-            self.pipeline, scene, found.detections[index], number,
+            self.pipeline, glimpse.look.scene(scene.taken), glimpse.detection, number,
             wait=self._gap.is_of_slow_camera or not self._tracks)
 
     def _begin(
-        self, scene: Scene, found: Found, index: int, watch: Stopwatch
+        self, scene: Scene, glimpse: Glimpse, watch: Stopwatch
     ) -> tuple[EstimateStatus, BodyEstimate | None]:
         """Begin the track of a person who was detected and is nobody known."""
         if len(self._tracks) >= self.pipeline.config.max_people:
             return EstimateStatus.TOO_MANY, None
         with watch.step('begin'):
-            self._ask(scene, found, index)
+            self._ask(scene, glimpse)
         fresh = self._fresh.take(None)
         if fresh is None:
             # Who was fitted in vain is the nearest again, and is told why.

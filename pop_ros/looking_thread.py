@@ -1,0 +1,43 @@
+"""A thread that asks the keypoint source while the worker follows people.
+
+Networks leave the interpreter to others while they compute. The thread is a daemon, unlike those
+of `concurrent.futures`: a source that never answers cannot keep a stopped node alive.
+"""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any, TypeVar
+
+AnswerT = TypeVar('AnswerT')
+Job = tuple['Future[Any]', Callable[[], Any]]
+
+
+class LookingThread:
+    """Does one thing after the other, in the order given."""
+
+    def __init__(self) -> None:
+        """Start the thread."""
+        self._jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
+        threading.Thread(target=self._work, name='pop looking', daemon=True).start()
+
+    def submit(self, look: Callable[[], AnswerT]) -> Future[AnswerT]:
+        """Have something done; its error, if any, is the future's."""
+        future: Future[AnswerT] = Future()
+        self._jobs.put((future, look))
+        return future
+
+    def stop(self) -> None:
+        """End the thread once what was submitted is done."""
+        self._jobs.put(None)
+
+    def _work(self) -> None:
+        while (job := self._jobs.get()) is not None:
+            future, look = job
+            try:
+                future.set_result(look())
+            except Exception as error:  # noqa: BLE001 - whoever waits for the answer is told
+                future.set_exception(error)

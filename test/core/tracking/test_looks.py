@@ -1,0 +1,187 @@
+"""Looks for people beside the following: what comes in late, and what is forgotten."""
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.one_person import CAMERA, lift_truth
+from support.stage import Stage, only
+
+from pop_core.body.kinematics import attached_positions, joints
+from pop_core.body.model import BodyModel, BodyParameters, shared_points
+from pop_core.depth_noise import USUAL_NOISE
+from pop_core.errors import PopError
+from pop_core.geometry.camera import Camera
+from pop_core.rgbd import RgbdFrame
+from pop_core.tracking.detection_schedule import DetectionSchedule, Gap
+from pop_core.tracking.finder import Found
+from pop_core.tracking.late_belief import carried
+from pop_core.tracking.looks import Look, Looks
+from pop_core.tracking.tracking_config import TrackingConfig
+
+STEP_M = 0.03  # a slow walk at the stage's rate
+NEAR_M = 0.05  # who sets out is followed late by a part of a step
+OFTEN = TrackingConfig(detect_every=2)
+
+
+class Slow:
+    """Sees at once what there is to see, and tells of it when it is told to."""
+
+    def __init__(self) -> None:
+        self.waiting: list[tuple[Future, Look]] = []
+        self.looks = 0
+        self.is_at_once = False
+
+    def submit(self, look: Callable[[], Look]) -> Future:
+        self.looks += 1
+        future: Future = Future()
+        self.waiting.append((future, look()))
+        if self.is_at_once:
+            self.finish()
+        return future
+
+    def finish(self) -> None:
+        """Tell what waits."""
+        for future, look in self.waiting:
+            future.set_result(look)
+        self.waiting.clear()
+
+
+@pytest.fixture
+def slow() -> Slow:
+    return Slow()
+
+
+@pytest.fixture
+def stage(body: BodyModel, slow: Slow, person: BodyParameters) -> Stage:
+    """Somebody who is followed well; from now on looks take their time."""
+    slow.is_at_once = True
+    made = Stage(body, OFTEN, lookout=slow)
+    made.show(person, times=5)
+    slow.is_at_once = False
+    return made
+
+
+def walked(person: BodyParameters, steps: int) -> BodyParameters:
+    return person.replaced(transl=person.transl + [STEP_M * steps, 0.0, 0.0])
+
+
+def off_m(stage: Stage, person: BodyParameters) -> float:
+    here = only(stage.show(person))
+    return float(np.linalg.norm(here.joints - joints(stage.body, person), axis=1).mean())
+
+
+def test_nobody_waits_for_a_look_and_one_at_a_time_is_made(
+    stage: Stage, slow: Slow, person: BodyParameters
+) -> None:
+    looks = slow.looks
+    for step in range(8):
+        assert off_m(stage, walked(person, step)) < NEAR_M
+    assert slow.looks == looks + 1
+
+
+def test_what_was_seen_frames_ago_pulls_nobody_back(
+    stage: Stage, slow: Slow, person: BodyParameters
+) -> None:
+    for step in range(10):
+        off_m(stage, walked(person, step))
+    assert slow.waiting
+    slow.finish()
+    # Ten steps are 30 cm, farther than keypoints may lie off without a doubt.
+    assert off_m(stage, walked(person, 10)) < NEAR_M
+    track, = stage.tracker._tracks
+    assert (track.misses, track.doubts) == (0, 0)
+
+
+def test_somebody_new_begins_in_the_frame_that_was_looked_at(
+    stage: Stage, slow: Slow, person: BodyParameters
+) -> None:
+    aside = person.replaced(transl=person.transl + [-0.9, 0.0, 0.2])
+    stage.show(person, aside, times=3)
+    assert slow.waiting
+    slow.finish()
+    stage.show(person, aside)
+    assert [body.track.id for body in stage.show(person, aside)] == [0, 1]
+
+
+def test_what_is_seen_of_a_time_before_a_reset_is_forgotten(
+    stage: Stage, slow: Slow, person: BodyParameters
+) -> None:
+    stage.show(person, times=3)
+    (future, look), = slow.waiting
+    stage.tracker.reset()
+    slow.waiting.clear()
+    future.set_result(look)
+    slow.is_at_once = True
+    stage.source.people = []
+    away = stage.frame(hidden=True)
+    assert stage.tracker.process(replace(away, stamp_ns=away.stamp_ns + 1)).bodies == ()
+
+
+def test_an_error_of_a_late_look_is_raised_once(
+    stage: Stage, slow: Slow, person: BodyParameters
+) -> None:
+    stage.show(person, times=3)
+    (future, _), = slow.waiting
+    slow.waiting.clear()
+    future.set_exception(PopError('no keypoints'))
+    with pytest.raises(PopError, match='no keypoints'):
+        stage.show(person)
+    assert off_m(stage, person) < NEAR_M
+
+
+def test_who_is_followed_by_nobody_is_looked_for_at_once(
+    body: BodyModel, slow: Slow, person: BodyParameters
+) -> None:
+    slow.is_at_once = True
+    alone = Stage(body, OFTEN, lookout=slow)
+    assert only(alone.show(person)).track.id == 0
+
+
+def a_look() -> Look:
+    frame = RgbdFrame(
+        np.zeros((2, 2, 3), np.uint8), np.ones((2, 2), np.float32),
+        Camera(2, 2, 2.0, 2.0, 0.5, 0.5), 0)
+    return Look(frame, Found(), None, USUAL_NOISE, {})
+
+
+def test_a_look_that_is_needed_at_once_is_taken_before_an_old_one(slow: Slow) -> None:
+    looks = Looks(slow)
+    old, new = a_look(), a_look()
+    assert looks.look(lambda: old, wait=False) is None
+    assert looks.is_busy
+    slow.is_at_once = True
+    assert looks.look(lambda: new, wait=True) is new
+    assert not looks.is_busy
+    assert looks.take() is None
+
+
+def test_without_help_every_look_is_waited_for() -> None:
+    looks, made = Looks(), a_look()
+    assert looks.look(lambda: made, wait=False) is made
+    assert not looks.is_busy
+
+
+def test_no_look_is_due_while_one_is_made() -> None:
+    schedule = DetectionSchedule(TrackingConfig(detect_every=2))
+    quick = Gap(1 / 30)
+    assert not schedule.is_due([], quick, is_looking=True)
+    assert schedule.is_due([], quick)
+
+
+def test_carried_joints_keep_their_errors_and_their_pixels_follow(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    lifted = lift_truth(body, person)
+    noisy = replace(lifted, positions_camera=lifted.positions_camera + 0.02)
+    there, here = (
+        attached_positions(shared_points(body), body, p) for p in (person, walked(person, 2)))
+    moved = carried(noisy, there, here, CAMERA)
+    np.testing.assert_allclose(
+        moved.positions_camera, here + 0.02 + (lifted.positions_camera - there), atol=1e-12)
+    np.testing.assert_allclose(
+        moved.keypoints_px - lifted.keypoints_px, CAMERA.project(here) - CAMERA.project(there),
+        atol=1e-9)
+    np.testing.assert_array_equal(moved.sigma_m, lifted.sigma_m)
