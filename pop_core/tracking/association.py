@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.optimize import linear_sum_assignment
 
-from pop_core.body.joints import SHARED_INDEX
+from pop_core.body.joints import SHARED_INDEX, SHARED_MIRROR
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.keypoints.skeleton import BONES
@@ -20,6 +20,7 @@ SIZE_WORTH_M = 0.6  # per unit of log size
 SIZE_SIGMA = 0.12  # two lifted skeletons of one person differ by this [log size]
 FEWEST_BONES = 3
 COVERED_WORTH_M = 0.1  # a joint that is known across its ray only is as good as this far off
+OWN_OVERLAP = 0.5  # share of the keypoints on a person's pixels that tells it is them
 NO_MATCH = 1e6
 BONE_ENDS = np.array([(SHARED_INDEX[a], SHARED_INDEX[b]) for a, b, _ in BONES])
 
@@ -94,9 +95,10 @@ def matching_cost(
     """
     overlap = mask_overlap(person.mask, detection)
     if not lifted.lifted.any():
-        return NO_MATCH if overlap < 0.5 else MASK_WORTH_M * (2.0 - overlap)
+        return NO_MATCH if overlap < OWN_OVERLAP else MASK_WORTH_M * (2.0 - overlap)
     distance = offset_m(person, lifted)
-    if distance > reach_m(person, gate_m):
+    # Who is seen where somebody is, is hardly somebody else.
+    if distance > reach_m(person, gate_m) * (2.0 if overlap > OWN_OVERLAP else 1.0):
         return NO_MATCH
     size = log_size(lifted, person.points)
     strange = max(0.0, abs(size) - SIZE_SIGMA)
@@ -106,15 +108,26 @@ def matching_cost(
 def offset_m(person: Expected, lifted: LiftedJoints) -> float:
     """Return how far lifted joints lie from a person's, the median; 0 where none is lifted.
 
-    Joints that were lifted onto somebody nearer tell their direction only.
+    Joints that were lifted onto somebody nearer tell their direction only; and left may have been
+    taken for right.
     """
     rows = lifted.lifted
     if not rows.any():
         return 0.0
-    points, found = person.points[rows], lifted.positions_camera[rows]
+    return min(
+        _median_offset_m(person, points[rows], lifted.positions_camera[rows],
+                         lifted.keypoints_px[rows])
+        for points in (person.points, person.points[SHARED_MIRROR]))
+
+
+def _median_offset_m(
+    person: Expected, points: Float[np.ndarray, 'n 3'], found: Float[np.ndarray, 'n 3'],
+    uv: Float[np.ndarray, 'n 2'],
+) -> float:
+    """Return the median distance between a person's points and where they were found [m]."""
     distance = np.linalg.norm(points - found, axis=1)
     if person.cover is not None:
-        covered = _on_mask(person.cover, lifted.keypoints_px[rows])
+        covered = _on_mask(person.cover, uv)
         along = found / np.linalg.norm(found, axis=1, keepdims=True)
         across = points - np.einsum('nc,nc->n', points, along)[:, None] * along
         aside = COVERED_WORTH_M + np.linalg.norm(across, axis=1)

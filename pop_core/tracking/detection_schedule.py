@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pop_core.estimate import TrackState
+from pop_core.body.joints import SHARED
+from pop_core.estimate import JointState, TrackState
 from pop_core.tracking.track import PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
 
@@ -63,12 +64,23 @@ class DetectionSchedule:
         every = self._config.detect_every
         if any(_needs_a_look(track) for track in tracks):
             every = min(every, SOON)
+        if any(_has_come_out(track) for track in tracks):
+            every = 1
         # A look of our own that took long is no reason for the next.
         after_gap = gap.is_long and (gap.is_of_slow_camera or self._frames_since > 1)
         if tracks and not (is_late or after_gap) and self._frames_since < every:
             return False
         self._frames_since = 0
         return True
+
+
+def _has_come_out(track: PersonTrack) -> bool:
+    """Return whether a joint is seen that was hidden when people were looked for last.
+
+    Surfaces carry a limb on, but do not tell where it comes out from behind something.
+    """
+    seen = track.joint_state == JointState.VISIBLE
+    return bool((seen & track.hidden_at_look)[SHARED].any())
 
 
 def _needs_a_look(track: PersonTrack) -> bool:

@@ -5,11 +5,15 @@ from __future__ import annotations
 from pop_core.body.joints import SHARED
 from pop_core.estimate import JointState, TrackState
 from pop_core.tracking.detection_schedule import Gap
+from pop_core.tracking.fresh_fits import FreshFit
 from pop_core.tracking.track import PersonTrack
 
 STALE_S = 0.25  # unseen for longer, a person is looked for anew
 MOST_DOUBTS, RESTART_EVERY_S = 2, 1.0
+# A body that no look has agreed with yet is looked for anew soon, then ever more rarely [s].
+FIRST_WAIT_S, LONGEST_WAIT_S = 0.2, 1.6
 MOST_MISSES = 3
+CREDIBLE_SCORE = 0.3  # of a body that may be somebody who was lost
 CLEARLY_SEEN = 8  # shared joints that a body claims the camera sees: a detector would find it
 SETTLED_S = 0.5  # after a body was found
 
@@ -26,7 +30,19 @@ def is_doubtful(track: PersonTrack, gap: Gap) -> bool:
     """
     if gap.is_of_slow_camera:
         return True
+    if track.tries > 0:
+        wait_s = min(FIRST_WAIT_S * 2.0 ** (track.tries - 1), LONGEST_WAIT_S)
+        return track.doubts > 0 and _restarted_ago_s(track) > wait_s
     return track.doubts >= MOST_DOUBTS and _restarted_ago_s(track) > RESTART_EVERY_S
+
+
+def may_be(track: PersonTrack, fresh: FreshFit) -> bool:
+    """Return whether a body found anew may be a person: of who was not seen it must explain much.
+
+    Of somebody who comes out from behind a wall the first keypoints lie on the wall.
+    """
+    found = fresh.person.estimate
+    return not is_stale(track) or (found is not None and found.score >= CREDIBLE_SCORE)
 
 
 def is_settled(track: PersonTrack) -> bool:
@@ -38,7 +54,7 @@ def count_misses(track: PersonTrack, was_detected: bool) -> None:
     """Give up a body that no further look for people confirms: a new one, or one in full view."""
     track.misses = 0 if was_detected else track.misses + 1
     clear = (track.joint_state[SHARED] == JointState.VISIBLE).sum() >= CLEARLY_SEEN
-    if track.misses >= MOST_MISSES and (track.state is TrackState.NEW or clear):
+    if track.misses >= MOST_MISSES and (clear or not track.is_proven):
         track.state = TrackState.LOST
 
 

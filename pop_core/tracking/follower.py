@@ -32,7 +32,7 @@ from pop_core.tracking.limb_search import LimbSearch
 from pop_core.tracking.limbs import contradicted_joints, loosened, lost_limbs
 from pop_core.tracking.liveliness import followed_trail, liveliness
 from pop_core.tracking.motion import N_MOVING
-from pop_core.tracking.rivals import costs, follow_alternatives
+from pop_core.tracking.rivals import BETTER, costs, follow_alternatives
 from pop_core.tracking.sides import misnamed_joints, renamed, without_joints
 from pop_core.tracking.track import Alternative, PersonTrack
 from pop_core.tracking.track_view import observe_track
@@ -115,6 +115,7 @@ class Follower:
         track.filter = self._found_anew(track, fresh, lifted)
         assert fresh.person.body is not None
         self.begin(track, fresh.person.body)
+        track.tries += 1
         late_s = (track.now_ns - fresh.stamp_ns) * 1e-9
         for other in track.alternatives:
             other.filter = moved_on(other.filter, self.pipeline.fitter.coarse, late_s, lifted)
@@ -157,8 +158,11 @@ class Follower:
         belief = self._found_anew(track, rival, observation.lifted)
         other = self.warm.fit(belief, observation, self.config.steps, detected=True)
         ours, theirs = costs(self.warm.fitter, [fit, other], observation)
-        if theirs >= ours:
+        # Who was followed well is more than what one frame says of them.
+        if theirs >= ours - (0.0 if track.tries > 0 else BETTER):
+            track.tries += track.tries > 0
             return fit
+        track.tries += 1
         track.filter, track.depth_level = belief, None
         track.alternatives.clear()
         return other
@@ -243,6 +247,8 @@ class Follower:
         if lifted is not None:
             against = contradicted_joints(fit.state, lifted).any() or track.misnamed.any()
             track.doubts = track.doubts + 1 if track.is_doubtful or against else 0
+            if track.doubts == 0:
+                track.tries, track.is_proven = 0, True
 
     def _coast(
         self, track: PersonTrack, scene: Scene, start: SeenBody

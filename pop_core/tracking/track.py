@@ -47,6 +47,7 @@ class PersonTrack:
         joint_seen_ns: The same per joint.
         mask: Pixels of the person in the last frame.
         joint_state: A JointState per joint of the last frame.
+        hidden_at_look: Which joints the camera did not see when people were looked for last.
         trust: Plausibility at the last detection, 0..1.
         state: Where the track is in its life.
         hits: Frames in which the person was seen.
@@ -54,6 +55,8 @@ class PersonTrack:
         doubts: Detections, one after the other, after which something was still wrong.
         is_doubtful: Whether something was wrong in the last frame.
         misnamed: Shared joints whose left and right were exchanged at the last detection.
+        is_proven: Whether a look after the first one has agreed with the body.
+        tries: Bodies that were taken over since a look last agreed with one.
         restarted_ns: When the body was last looked for anew.
         trail: Where the joints were of late, None before the second frame [m].
         depth_level: E_depth that is usual for this person [m].
@@ -69,6 +72,7 @@ class PersonTrack:
     joint_seen_ns: Int[np.ndarray, '24']
     mask: Bool[np.ndarray, 'h w']
     joint_state: Int[np.ndarray, '24']
+    hidden_at_look: Bool[np.ndarray, '24']
     trust: float
     gap_s: float = 0.0
     state: TrackState = TrackState.NEW
@@ -77,6 +81,8 @@ class PersonTrack:
     doubts: int = 0
     is_doubtful: bool = False
     misnamed: Bool[np.ndarray, '15'] = field(default_factory=_no_joints)
+    is_proven: bool = False
+    tries: int = 1
     restarted_ns: int = 0
     trail: Float[np.ndarray, '24 3'] | None = None
     depth_level: float | None = None
@@ -107,6 +113,10 @@ class PersonTrack:
         sure = self.hits >= config.confirm_frames
         self.state = TrackState.TRACKED if sure else TrackState.NEW
 
+    def note_look(self) -> None:
+        """Take over that people were looked for in the present frame."""
+        self.hidden_at_look = self.joint_state != JointState.VISIBLE
+
     def note_unseen(self, hidden: bool, config: TrackingConfig) -> None:
         """Take over a frame that shows nothing of the person.
 
@@ -122,7 +132,7 @@ class PersonTrack:
 
     def has_ended(self, config: TrackingConfig) -> bool:
         """Return whether the person will not get this id again."""
-        never_sure = self.hits < config.confirm_frames
+        never_sure = self.hits < config.confirm_frames or not self.is_proven
         return self.state is TrackState.LOST and (never_sure or self.unseen_s > config.lost_s)
 
     def tag(self) -> Track:
@@ -140,4 +150,5 @@ def new_track(
     unseen = np.full(N_JOINTS, now_ns)
     return PersonTrack(
         id=number, filter=belief, born_ns=now_ns, now_ns=now_ns, seen_ns=now_ns,
-        joint_seen_ns=unseen, mask=estimate.mask, joint_state=estimate.joint_state, trust=trust)
+        joint_seen_ns=unseen, mask=estimate.mask, joint_state=estimate.joint_state,
+        hidden_at_look=estimate.joint_state != JointState.VISIBLE, trust=trust)

@@ -19,7 +19,14 @@ from pop_core.stopwatch import Stopwatch
 from pop_core.tracking.association import Expected, associate, behind_others
 from pop_core.tracking.body_filter import first_state
 from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, Gap
-from pop_core.tracking.doubts import STALE_S, count_misses, is_doubtful, is_settled, is_stale
+from pop_core.tracking.doubts import (
+    STALE_S,
+    count_misses,
+    is_doubtful,
+    is_settled,
+    is_stale,
+    may_be,
+)
 from pop_core.tracking.finder import Finder
 from pop_core.tracking.follower import Follower
 from pop_core.tracking.fresh_fits import BackgroundFinder, FreshFit, FreshFits
@@ -151,6 +158,8 @@ class BodyTracker:
             if look is not None:
                 count_misses(track, glimpse is not None)
             estimate = self._continue(track, scene, glimpse, expected[row], watch)
+            if look is not None:
+                track.note_look()
             if estimate is not None:
                 bodies.append(estimate)
                 scene = replace(scene, taken=scene.taken | estimate.mask)
@@ -204,6 +213,8 @@ class BodyTracker:
             if late_s > 0.0:
                 self._follower.catch_up(track, lifted, late_s)
         rival = fresh if fresh is not None and fresh.person.body is not None else None
+        if rival is not None and not may_be(track, rival):
+            rival = lifted = None
         if rival is not None and elsewhere:
             self._follower.restart(track, rival, lifted)
         elif track.state is TrackState.LOST and lifted is None:

@@ -10,7 +10,13 @@ from pop_core.body.kinematics import attached_positions
 from pop_core.body.model import BodyModel, BodyParameters, shared_points
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.lifted_joints import LiftedJoints
-from pop_core.tracking.association import Expected, associate, behind_others, log_size
+from pop_core.tracking.association import (
+    Expected,
+    associate,
+    behind_others,
+    log_size,
+    offset_m,
+)
 
 GATE_M = 0.35
 NOWHERE = np.zeros((CAMERA.height, CAMERA.width), dtype=bool)
@@ -111,3 +117,23 @@ def test_nobody_takes_the_detection_of_another_to_leave_none_over(
     # The second detection lies between them; the first is exactly the first person's.
     found = [seen(body, person, 0.0), seen(body, person, -0.8)]
     assert matches(people, found) == {0: 0}
+
+
+def test_who_is_seen_the_other_way_round_is_the_same_person(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    found, lifted = seen(body, person, 0.0)
+    assert offset_m(expected(body, person, 0.0), lifted.with_sides_exchanged()) < 0.05
+    assert matches(
+        [expected(body, person, 0.0)], [(found, lifted.with_sides_exchanged())]) == {0: 0}
+
+
+def test_who_is_seen_on_the_pixels_of_a_person_is_that_person(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    found = seen(body, person, 0.5)
+    u, v = np.rint(found[0].keypoints_px).astype(int).T
+    own = NOWHERE.copy()
+    own[v, u] = True
+    assert matches([expected(body, person, 0.0)], [found]) == {}
+    assert matches([expected(body, person, 0.0, mask=own)], [found]) == {0: 0}

@@ -1,0 +1,94 @@
+"""When a person is looked for anew, and when a body is given up."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.one_person import facing_person
+from support.stage import RATE_HZ, Stage, only
+
+from pop_core.body.model import BodyModel, BodyParameters
+from pop_core.estimate import EstimateStatus, JointState, TrackState
+from pop_core.tracking.detection_schedule import DetectionSchedule, Gap
+from pop_core.tracking.doubts import count_misses, is_doubtful, may_be
+from pop_core.tracking.finder import FoundPerson
+from pop_core.tracking.fresh_fits import FreshFit
+from pop_core.tracking.track import PersonTrack
+from pop_core.tracking.tracking_config import TrackingConfig
+
+FRAME = Gap(1.0 / RATE_HZ)
+FRAME_NS = round(1e9 / RATE_HZ)
+
+
+@pytest.fixture(scope='module')
+def followed(body: BodyModel) -> Stage:
+    stage = Stage(body)
+    only(stage.show(facing_person(np.zeros(10)), times=5))
+    return stage
+
+
+@pytest.fixture
+def track(followed: Stage) -> PersonTrack:
+    return replace(followed.tracker._tracks[0])
+
+
+def first_doubtful_s(track: PersonTrack) -> float:
+    born_ns = track.restarted_ns = track.now_ns
+    while not is_doubtful(track, FRAME):
+        track.now_ns += FRAME_NS
+    return (track.now_ns - born_ns) * 1e-9
+
+
+def test_a_body_that_no_look_agreed_with_is_looked_for_soon_then_ever_more_rarely(
+    track: PersonTrack
+) -> None:
+    track.doubts = 1
+    waits = []
+    for track.tries in (1, 2, 3, 4, 9):
+        waits.append(first_doubtful_s(track))
+    assert waits[0] < 0.3
+    assert (np.diff(waits[:4]) > 0).all()
+    assert waits[4] < 2.0
+    track.tries, track.now_ns = 0, track.restarted_ns + 10 * FRAME_NS * 10
+    assert not is_doubtful(track, FRAME)  # one contradiction of who was followed well
+
+
+def test_looks_prove_a_body(followed: Stage, track: PersonTrack) -> None:
+    assert track.is_proven
+    assert track.tries == 0
+    count_misses(track, False)
+    count_misses(track, False)
+    track.joint_state = np.full(24, JointState.SCENE_OCCLUDED)
+    count_misses(track, False)
+    assert track.state is TrackState.TRACKED  # hidden behind something, and known
+    track.is_proven = False
+    count_misses(track, False)
+    assert track.state is TrackState.LOST
+    assert track.has_ended(TrackingConfig())
+
+
+def test_of_who_was_lost_a_body_found_anew_must_explain_much(
+    body: BodyModel, followed: Stage, person: BodyParameters, track: PersonTrack
+) -> None:
+    seen = only(followed.show(person))
+    good, poor = (
+        FreshFit(FoundPerson(EstimateStatus.OK, replace(seen, score=score)), 0)
+        for score in (0.9, 0.1))
+    assert may_be(track, poor)
+    track.seen_ns = track.now_ns - 10 * FRAME_NS
+    assert may_be(track, good)
+    assert not may_be(track, poor)
+
+
+def test_a_joint_that_comes_out_is_looked_at_in_the_next_frame(track: PersonTrack) -> None:
+    schedule = DetectionSchedule(TrackingConfig(detect_every=5))
+    track.note_look()
+    assert schedule.is_due([track], FRAME)
+    assert not schedule.is_due([track], FRAME)
+    track.joint_state = np.full(24, JointState.SCENE_OCCLUDED)
+    track.note_look()
+    assert not schedule.is_due([track], FRAME)
+    track.joint_state = np.full(24, JointState.VISIBLE)
+    assert schedule.is_due([track], FRAME)
+    track.note_look()
+    assert not schedule.is_due([track], FRAME)
