@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Float32, UInt8
 
 from pop_core.errors import FrameError
 from pop_core.geometry.camera import Camera
+from pop_core.geometry.flying_pixel_kernels import flying
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,15 +104,6 @@ def flying_pixels(
     A pixel flies when a neighbour on one side is nearer and the opposite one is farther, both by
     more than `jump_ratio` of its depth: no surface seen by a camera does that.
     """
-    padded = np.pad(depth_m, 1, mode='edge')
-    here, jump = depth_m, depth_m * jump_ratio
-    flying = np.zeros(depth_m.shape, dtype=bool)
-    with np.errstate(invalid='ignore'):
-        for dy, dx in ((0, 1), (1, 0)):
-            h, w = depth_m.shape
-            before = padded[1 - dy: 1 - dy + h, 1 - dx: 1 - dx + w]
-            after = padded[1 + dy: 1 + dy + h, 1 + dx: 1 + dx + w]
-            rising = (before < here - jump) & (after > here + jump)
-            falling = (before > here + jump) & (after < here - jump)
-            flying |= rising | falling
-    return flying
+    out = np.empty(depth_m.shape, dtype=bool)
+    flying(np.ascontiguousarray(depth_m), jump_ratio, out)
+    return out

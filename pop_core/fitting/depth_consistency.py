@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
 from pop_core.fitting.body_state import BodyState
-from pop_core.fitting.observation import Observation, nearest_of
+from pop_core.fitting.observation import NearestPixels, Observation
 from pop_core.fitting.residuals import Pairs, join_pairs
 from pop_core.fitting.robust_loss import geman_mcclure_weight
 from pop_core.fitting.sight_kernels import see
@@ -87,7 +87,7 @@ class HidingPlaces:
         """Prepare slices for a body whose vertices lie at depths z [m]."""
         self.observation, self.segment = observation, segment
         self.slices_m = np.linspace(z.min(), z.max(), DEPTH_SLICES)
-        self._nearest: dict[int, Int[np.ndarray, 'h2 w2 2']] = {}
+        self._nearest: dict[int, NearestPixels] = {}
 
     def targets(
         self, points: Float[np.ndarray, 'n 3']
@@ -100,19 +100,18 @@ class HidingPlaces:
         pixel = np.full((len(points), 2), -1)
         for k in np.unique(which):
             rows = which == k
-            pixel[rows] = self._slice(int(k))[uv[rows, 1] // 2, uv[rows, 0] // 2]
+            # Every other pixel: a pull sideways need not know its end to the pixel.
+            pixel[rows] = 2 * self._slice(int(k)).of(uv[rows] // 2)
         known = pixel[:, 0] >= 0
         ray = self.observation.rays[pixel[:, 1], pixel[:, 0]]
         return np.column_stack([ray * points[:, 2:], points[:, 2]]), known
 
-    def _slice(self, k: int) -> Int[np.ndarray, 'h2 w2 2']:
+    def _slice(self, k: int) -> NearestPixels:
         if k not in self._nearest:
             depth_m = self.observation.depth_m
             with np.errstate(invalid='ignore'):
                 able = self.segment | (depth_m < self.slices_m[k]) | np.isnan(depth_m)
-            # Every other pixel: a pull sideways need not know its end to the pixel.
-            thin = nearest_of(able[::2, ::2])
-            self._nearest[k] = np.where(thin >= 0, 2 * thin, -1)
+            self._nearest[k] = NearestPixels(able[::2, ::2])
         return self._nearest[k]
 
 

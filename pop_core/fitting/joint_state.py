@@ -9,7 +9,7 @@ from pop_core.body.model import BodyModel
 from pop_core.estimate import JointState
 from pop_core.geometry.camera import Camera
 from pop_core.rendering.depth_renderer import RenderedDepth
-from pop_core.rendering.joint_visibility import joint_states
+from pop_core.rendering.joint_visibility import pixels_of, states_at
 
 SCENE_MARGIN_M = 0.06  # measured depth this much nearer than the body is something else
 
@@ -33,13 +33,10 @@ def fitted_joint_states(
         depth_m: Measured depth of the same pixels [m]; NaN where nothing was measured.
         camera: Pinhole of both images.
     """
-    part_of_face = np.append(model.bone_ids[model.f[:, 0], 0], -1)  # face -1 is no part
-    nearer = depth_m < rendered.depth_m - SCENE_MARGIN_M
-    others_m = np.where(nearer, depth_m, np.float32(np.inf))
-    state = joint_states(
-        joints, rendered.depth_m, part_of_face[rendered.face], others_m, camera)
-    u, v = np.nan_to_num(np.rint(camera.project(joints)), nan=-1).astype(np.int64).T
-    inside = state != JointState.OUT_OF_IMAGE
-    unmeasured = np.zeros(len(joints), dtype=bool)
-    unmeasured[inside] = np.isnan(depth_m[v[inside], u[inside]])
-    return np.where(unmeasured, int(JointState.UNKNOWN), state)
+    inside, u, v = pixels_of(joints, camera)
+    own_m, face, measured_m = rendered.depth_m[v, u], rendered.face[v, u], depth_m[v, u]
+    part = np.where(face >= 0, model.bone_ids[model.f[face, 0], 0], -1)
+    nearer = measured_m < own_m - SCENE_MARGIN_M
+    others_m = np.where(nearer, measured_m, np.float32(np.inf))
+    state = states_at(joints, inside, own_m, part, others_m)
+    return np.where(inside & np.isnan(measured_m), int(JointState.UNKNOWN), state)

@@ -191,16 +191,22 @@ def person_window(lifted: LiftedJoints, camera: Camera) -> Window:
     return Window(min(left, camera.width - 1), min(top, camera.height - 1), width, height, stride)
 
 
-def nearest_of(mask: Bool[np.ndarray, 'h w']) -> Int[np.ndarray, 'h w 2']:
-    """Return the pixel (u, v) of a mask nearest to each pixel; (-1, -1) when the mask is empty."""
-    if not mask.any():
-        return np.full((*mask.shape, 2), -1)
-    _, label = cv2.distanceTransformWithLabels(
-        (~mask).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
-    v, u = np.nonzero(mask)
-    pixel_of_label = np.zeros((len(v) + 1, 2), dtype=np.int64)
-    pixel_of_label[label[v, u]] = np.column_stack([u, v])
-    return pixel_of_label[label]
+class NearestPixels:
+    """Knows the pixel of a mask that is nearest to any pixel."""
+
+    def __init__(self, mask: Bool[np.ndarray, 'h w']) -> None:
+        """Number the pixels of a mask, and give every other pixel the number of the nearest."""
+        _, self._label = cv2.distanceTransformWithLabels(
+            (~mask).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+        v, u = np.nonzero(mask)
+        self._pixel_of_label = np.full((len(v) + 1, 2), -1, dtype=np.int64)
+        self._pixel_of_label[self._label[v, u]] = np.column_stack([u, v])
+
+    def of(self, uv: Int[np.ndarray, 'n 2']) -> Int[np.ndarray, 'n 2']:
+        """Return the nearest pixel (u, v) of each pixel; (-1, -1) when the mask is empty."""
+        if len(self._pixel_of_label) == 1:
+            return np.full(uv.shape, -1)
+        return self._pixel_of_label[self._label[uv[:, 1], uv[:, 0]]]
 
 
 def _clamp(value: float, size: int) -> int:

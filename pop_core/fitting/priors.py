@@ -36,8 +36,9 @@ def pose_prior_residual(
 def limit_prior_residual(state: BodyState, *, jacobian: bool) -> Residual:
     """Return by how much joints exceed their anatomical limits [rad]."""
     r, J = limit_residual(state.parameters.body_pose)
-    weight = np.full(len(r), 1 / LIMIT_SIGMA_RAD**2)
-    return Residual(r, _at(state, J, BODY_POSE) if jacobian else None, weight)
+    beyond = r != 0.0
+    weight = np.full(int(beyond.sum()), 1 / LIMIT_SIGMA_RAD**2)
+    return Residual(r[beyond], _at(state, J[beyond], BODY_POSE) if jacobian else None, weight)
 
 
 def neighbour_sigma_rad(

@@ -14,6 +14,7 @@ from jaxtyping import Float, Int
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.levenberg_marquardt import Residual, no_residual
 from pop_core.fitting.observation import KeypointRays
+from pop_core.fitting.pair_kernels import merge
 from pop_core.fitting.robust_loss import Kernel
 from pop_core.keypoints.lifted_joints import LiftedJoints
 
@@ -117,18 +118,8 @@ def merged_pairs(pairs: Pairs) -> tuple[Pairs, float]:
     """
     if len(pairs.vertex) == 0:
         return pairs, 0.0
-    weight = np.bincount(pairs.vertex, pairs.weight)
-    vertex, first = np.unique(pairs.vertex, return_index=True)
-    known = weight[vertex] > 0.0
-    vertex, first = vertex[known], first[known]
-    target = np.column_stack([
-        np.bincount(pairs.vertex, pairs.weight * along)[vertex] for along in pairs.target.T])
-    target /= weight[vertex, None]
-    merged = Pairs(vertex, pairs.direction[first], target, weight[vertex])
-    mean = np.zeros((len(weight), 3))
-    mean[vertex] = target
-    apart = np.einsum('nc,nc->n', pairs.direction, pairs.target - mean[pairs.vertex])
-    return merged, 0.5 * float(np.dot(pairs.weight * apart, apart))
+    *merged, spread = merge(pairs.vertex, pairs.direction, pairs.target, pairs.weight)
+    return Pairs(*merged), float(spread)
 
 
 def pair_residual(state: BodyState, pairs: Pairs, *, jacobian: bool) -> Residual:

@@ -30,9 +30,24 @@ def joint_states(
         others_depth_m: Depth of everything but this person; +inf where empty.
         camera: Camera without distortion.
     """
+    inside, u, v = pixels_of(joints, camera)
+    return states_at(joints, inside, own_depth_m[v, u], own_part[v, u], others_depth_m[v, u])
+
+
+def states_at(
+    joints: Float[np.ndarray, '24 3'], inside: Bool[np.ndarray, '24'],
+    own: Float[np.ndarray, '24'], part: Int[np.ndarray, '24'], others: Float[np.ndarray, '24'],
+) -> Int[np.ndarray, '24']:
+    """Return a JointState per joint, from what is seen at the pixel of each.
+
+    Args:
+        joints: Joint centres, camera frame [m].
+        inside: Whether the pixel lies in the image.
+        own: Depth of this person alone [m]; +inf where not covered.
+        part: Joint that moves the surface seen there, -1 where not covered.
+        others: Depth of everything but this person [m]; +inf where empty.
+    """
     state = np.full(N_JOINTS, JointState.OUT_OF_IMAGE, dtype=np.int64)
-    inside, u, v = _pixels(joints, camera)
-    own, part, others = own_depth_m[v, u], own_part[v, u], others_depth_m[v, u]
     near_skin = joints[:, 2] - own < _deepest()
     with_skin = np.isfinite(own) & _NEXT_TO[np.arange(N_JOINTS), part] & near_skin
     # At the rim a joint's pixel may just miss the body: then the joint itself is what is hidden.
@@ -50,7 +65,7 @@ def shared_states(
     """Return a JointState per shared point; the head's is that of the nose, a skin point."""
     out = states[SHARED].copy()
     row = SHARED_INDEX['head']
-    inside, u, v = _pixels(nose[None], camera)
+    inside, u, v = pixels_of(nose[None], camera)
     if not inside[0]:
         out[row] = JointState.OUT_OF_IMAGE
     elif nose[2] > others_depth_m[v[0], u[0]]:
@@ -62,7 +77,7 @@ def shared_states(
     return out
 
 
-def _pixels(
+def pixels_of(
     p_camera: Float[np.ndarray, 'n 3'], camera: Camera
 ) -> tuple[Bool[np.ndarray, 'n'], Int[np.ndarray, 'n'], Int[np.ndarray, 'n']]:
     """Return which points fall into the image, and their pixels (0, 0 for the others)."""

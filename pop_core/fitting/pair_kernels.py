@@ -1,0 +1,46 @@
+"""Numba kernel that merges the pairs of each vertex."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def merge(vertex, direction, target, weight):
+    """Return (vertex, direction, target, weight) of one pair per vertex, and what it costs less.
+
+    Targets are weighted means, weights sums; vertices without any weight are left out. Directions
+    are those of a vertex's first pair: they must be the same for all of them.
+    """
+    n = vertex.shape[0]
+    row_of = np.full(vertex.max() + 1, -1)
+    first = np.empty(n, dtype=np.int64)
+    count = 0
+    for i in range(n):
+        if weight[i] > 0.0 and row_of[vertex[i]] < 0:
+            row_of[vertex[i]] = count
+            first[count] = i
+            count += 1
+    out_vertex = vertex[first[:count]]
+    out_direction = direction[first[:count]]
+    out_target = np.zeros((count, 3))
+    out_weight = np.zeros(count)
+    for i in range(n):
+        row = row_of[vertex[i]]
+        if weight[i] > 0.0:
+            out_weight[row] += weight[i]
+            for c in range(3):
+                out_target[row, c] += weight[i] * target[i, c]
+    for row in range(count):
+        for c in range(3):
+            out_target[row, c] /= out_weight[row]
+    spread = 0.0
+    for i in range(n):
+        row = row_of[vertex[i]]
+        if weight[i] > 0.0:
+            apart = 0.0
+            for c in range(3):
+                apart += direction[i, c] * (target[i, c] - out_target[row, c])
+            spread += 0.5 * weight[i] * apart * apart
+    return out_vertex, out_direction, out_target, out_weight, spread
