@@ -11,7 +11,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.linalg import blas, cho_factor, cho_solve
+from scipy.linalg import blas, lapack
 
 StateT = TypeVar('StateT')
 
@@ -70,18 +70,18 @@ def cost_of(blocks: Sequence[Residual]) -> float:
 
 def assemble(blocks: Sequence[Residual], size: int) -> NormalEquations:
     """Return J'wr and J'wJ summed over blocks."""
-    gradient = np.zeros(size)
-    hessian = np.zeros((size, size))
-    for block in blocks:
-        if block.J is None or len(block.r) == 0:
-            continue
-        root = np.sqrt(block.w)
-        weighted = block.J * root[:, None]
-        gradient += weighted.T @ (root * block.r)
-        # dsyrk forms one triangle only: half the work of a product.
-        hessian += blas.dsyrk(1.0, weighted.T, lower=0)
-    upper = np.triu(hessian)
-    return NormalEquations(cost_of(blocks), gradient, upper + np.triu(upper, 1).T)
+    linear = [block for block in blocks if block.J is not None and len(block.r)]
+    count = sum(len(block.r) for block in linear)
+    J, r, row = np.empty((count, size)), np.empty(count), 0
+    for block in linear:
+        assert block.J is not None
+        root, rows = np.sqrt(block.w), slice(row, row + len(block.r))
+        np.multiply(block.J, root[:, None], out=J[rows])
+        r[rows] = root * block.r
+        row = rows.stop
+    # dsyrk forms one triangle only, half the work of a product; once, not block by block.
+    upper = np.triu(blas.dsyrk(1.0, J.T, lower=0)) if count else np.zeros((size, size))
+    return NormalEquations(cost_of(blocks), J.T @ r, upper + np.triu(upper, 1).T)
 
 
 def damped_step(
@@ -98,7 +98,10 @@ def damped_step(
     hessian[np.diag_indices(len(free))] += damping * (np.diag(hessian) + 1e-9)
     step = np.zeros(len(equations.gradient))
     # Cholesky: symmetric positive definite by construction.
-    step[free] = -cho_solve(cho_factor(hessian, check_finite=False), equations.gradient[free])
+    factor, failed = lapack.dpotrf(hessian, overwrite_a=1)
+    if failed:
+        raise np.linalg.LinAlgError('the damped Hessian is not positive definite')
+    step[free] = -lapack.dpotrs(factor, equations.gradient[free])[0]
     return step
 
 

@@ -9,6 +9,7 @@ doubt of their prediction. An arm left with few points is hidden, and claims non
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from itertools import pairwise
 
 import cv2
@@ -16,13 +17,14 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pop_core.body.joints import JOINT_NAMES, SHARED_INDEX
-from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.body_state import BodyState, FitBody
 from pop_core.fitting.limb_points import KINDS
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import Pairs
 from pop_core.rendering.depth_renderer import render_parts
 
 LIMBS = tuple(kind.joints for kind in KINDS)
+TRUNK = len(LIMBS)  # the part of all that is no limb
 ARM_LIMBS = (0, 1)
 ENDS = np.array([SHARED_INDEX[JOINT_NAMES[limb[2]]] for limb in LIMBS])  # wrists and ankles
 TRUNK_SIGMA_M = 0.02  # cloth, and the place of what is surer
@@ -46,6 +48,14 @@ def limbs_of(bones: Bool[np.ndarray, '24']) -> Int[np.ndarray, 'n']:
     return limbs[limbs >= 0]
 
 
+@lru_cache(maxsize=4)
+def parts_of(body: FitBody) -> tuple[Int[np.ndarray, 'n'], Int[np.ndarray, 'm']]:
+    """Return the limb of each vertex of a body, -1 for none, and of each face, or TRUNK."""
+    limb_of_vertex = LIMB_OF_BONE[body.main_bone]
+    limb_of_face = limb_of_vertex[body.faces].max(axis=1)
+    return limb_of_vertex, np.where(limb_of_face < 0, TRUNK, limb_of_face)
+
+
 class LimbClaims:
     """What is surer than each limb of a body, as the camera would see it alone."""
 
@@ -60,13 +70,10 @@ class LimbClaims:
             doubt_m: Standard deviation of each shared joint's predicted place.
         """
         self.observation = observation
-        self.limb_of_vertex = LIMB_OF_BONE[state.body.main_bone]
-        of_face = self.limb_of_vertex[state.body.faces].max(axis=1)
-        of_face[of_face < 0] = len(LIMBS)
-        order = [-1, *np.argsort(doubt_m[ENDS], kind='stable').tolist()]
-        # The trunk, which belongs to no limb, is the last part.
+        self.limb_of_vertex, part_of_face = parts_of(state.body)
+        order = [TRUNK, *np.argsort(doubt_m[ENDS], kind='stable').tolist()]
         alone_m = render_parts(
-            state.vertices, state.body.faces, of_face, len(LIMBS) + 1, observation.camera)
+            state.vertices, state.body.faces, part_of_face, TRUNK + 1, observation.camera)
         surer = np.full(observation.depth_m.shape, np.inf, dtype=np.float32)
         self._surer_m = np.empty((len(LIMBS), *surer.shape), dtype=np.float32)
         for part, following in pairwise(order):
