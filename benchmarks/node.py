@@ -1,6 +1,6 @@
 """What the ROS side costs: messages out, images in, and the way from camera to mesh.
 
-    python -m benchmarks node [PART ...] [--people 1 3] [--seconds 20] [--json FILE]
+    python -m benchmarks node [PART ...] [--people 1 3] [--seconds 20] [--keypoints SOURCE]
     python -m benchmarks node soak --minutes 10
 
 Parts: messages (build and publish, per topic), inputs (pair and decode one VGA pair), latency (a
@@ -57,6 +57,9 @@ def run(arguments: list[str]) -> int:
     parser.add_argument(
         '--people', type=int, nargs='+', default=[1, 3], choices=KINDS, help='people seen')
     parser.add_argument('--seconds', type=float, default=20.0, help='duration of latency')
+    parser.add_argument(
+        '--keypoints', default='json', metavar='SOURCE',
+        help="as `pop node` names it; 'json' stands for those of the film, which cost nothing")
     parser.add_argument('--minutes', type=float, default=10.0, help='duration of soak')
     parser.add_argument('--json', type=Path, help='file to write the figures into')
     options = parser.parse_args(arguments)
@@ -67,13 +70,16 @@ def run(arguments: list[str]) -> int:
     parts: dict[str, Callable[[], Rows]] = {
         'messages': lambda: measure_messages(one_walker()),
         'inputs': lambda: measure_inputs(one_walker().frame),
-        'latency': lambda: [measure_latency(n, options.seconds) for n in options.people],
+        'latency': lambda: [
+            measure_latency(n, options.seconds, options.keypoints) for n in options.people],
     }
     results = {}
     for name in options.parts or parts:
         if name == 'soak':
-            row, good = soak(options.people[0], options.minutes, lambda row: console.print(
-                ', '.join(f'{key} {value}' for key, value in row.items()), markup=False))
+            row, good = soak(
+                options.people[0], options.minutes, options.keypoints,
+                lambda row: console.print(
+                    ', '.join(f'{key} {value}' for key, value in row.items()), markup=False))
             results[name] = [row]
         else:
             results[name] = parts[name]()

@@ -78,11 +78,11 @@ class Live:
 
 
 @contextmanager
-def live(people: int, *ros_arguments: str) -> Iterator[Live]:
-    """Start everything and wait for the first mesh."""
+def live(people: int, source: str = 'json', *ros_arguments: str) -> Iterator[Live]:
+    """Start everything and wait for the first mesh; keypoints are the film's, or a network's."""
     with tempfile.TemporaryDirectory() as folder:
         film = Film(people, Path(folder))
-        process = WatchedNode(film.folder, *ros_arguments)
+        process = WatchedNode(source, film.folder, *ros_arguments)
         rclpy.init()
         node = Node('benchmark')
         try:
@@ -101,9 +101,9 @@ def live(people: int, *ros_arguments: str) -> Iterator[Live]:
             process.stop()
 
 
-def measure_latency(people: int, seconds: float) -> Row:
-    """Return time to the first result, rate, latency, processor and memory."""
-    with live(people) as running:
+def measure_latency(people: int, seconds: float, source: str) -> Row:
+    """Return time to the first result, rate, latency, processor and memory, for a source."""
+    with live(people, source) as running:
         first_s = running.listener.first_s
         assert first_s is not None
         running.camera.run(WARM_UP_S)
@@ -112,10 +112,12 @@ def measure_latency(people: int, seconds: float) -> Row:
                 **running.measure(seconds)}
 
 
-def soak(people: int, minutes: float, show: Callable[[Row], None]) -> tuple[Row, bool]:
+def soak(
+    people: int, minutes: float, source: str, show: Callable[[Row], None]
+) -> tuple[Row, bool]:
     """Run for minutes, showing a row now and then; return the verdict, and whether it is good."""
     rows: list[Row] = []
-    with live(people) as running:
+    with live(people, source) as running:
         running.camera.run(min(SOAK_WARM_UP_S, 6 * minutes))
         end_s = time.monotonic() + 60 * minutes
         while time.monotonic() < end_s:

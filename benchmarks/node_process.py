@@ -15,12 +15,19 @@ STOP_S = 30.0
 
 
 class WatchedNode:
-    """A node with keypoints from a folder; Linux tells what it uses."""
+    """A node whose use of memory and processor Linux tells."""
 
-    def __init__(self, keypoints: Path, *ros_arguments: str) -> None:
-        """Start it."""
-        command = [sys.executable, '-m', 'pop_ros.node', '--keypoints', 'json',
-                   '--keypoints-dir', str(keypoints), '--ros-args', *ros_arguments]
+    def __init__(self, source: str, folder: Path, *ros_arguments: str) -> None:
+        """Start it.
+
+        Args:
+            source: Where keypoints come from, as `--keypoints` names it.
+            folder: Files of the film's keypoints, for the source `json`.
+            ros_arguments: What follows `--ros-args`.
+        """
+        files = ['--keypoints-dir', str(folder)] if source == 'json' else []
+        command = [sys.executable, '-m', 'pop_ros.node', '--keypoints', source, *files,
+                   '--ros-args', *ros_arguments]
         self.started_s = time.monotonic()
         self._process = subprocess.Popen(command)
 
