@@ -11,6 +11,8 @@ from pop_core.tracking.track import PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
 
 LONG_GAP_S = 0.12  # between two frames of a camera: people move far, and there is time to look
+# Noise of depth as wide as a limb is thick does not tell where one moves to.
+BLURRED_M, MOVING_M = 0.028, 0.05
 SOON = 2  # frames from one look to the next while somebody is not followed well
 
 
@@ -64,7 +66,7 @@ class DetectionSchedule:
         every = self._config.detect_every
         if any(_needs_a_look(track) for track in tracks):
             every = min(every, SOON)
-        if any(_has_come_out(track) for track in tracks):
+        if any(track.tries > 0 or _has_come_out(track) for track in tracks):
             every = 1
         # A look of our own that took long is no reason for the next.
         after_gap = gap.is_long and (gap.is_of_slow_camera or self._frames_since > 1)
@@ -84,4 +86,5 @@ def _has_come_out(track: PersonTrack) -> bool:
 
 
 def _needs_a_look(track: PersonTrack) -> bool:
-    return track.is_doubtful or track.state is not TrackState.TRACKED
+    is_blurred = track.blur_m > BLURRED_M and track.left_m > MOVING_M
+    return is_blurred or track.is_doubtful or track.state is not TrackState.TRACKED

@@ -11,7 +11,7 @@ from pop_core.tracking.track import PersonTrack
 STALE_S = 0.25  # unseen for longer, a person is looked for anew
 MOST_DOUBTS, RESTART_EVERY_S = 2, 1.0
 # A body that no look has agreed with yet is looked for anew soon, then ever more rarely [s].
-FIRST_WAIT_S, LONGEST_WAIT_S = 0.2, 1.6
+FIRST_WAIT_S, LONGEST_WAIT_S = 0.05, 1.6
 MOST_MISSES = 3
 CREDIBLE_SCORE = 0.3  # of a body that may be somebody who was lost
 CLEARLY_SEEN = 8  # shared joints that a body claims the camera sees: a detector would find it

@@ -27,9 +27,9 @@ from pop_core.tracking.body_filter import (
 from pop_core.tracking.finder import FoundBody
 from pop_core.tracking.fresh_fits import FreshFit
 from pop_core.tracking.late_belief import caught_up, moved_on
-from pop_core.tracking.limb_claims import limbs_of
+from pop_core.tracking.limb_claims import limbs_of, open_shares
 from pop_core.tracking.limb_search import LimbSearch
-from pop_core.tracking.limbs import contradicted_joints, loosened, lost_limbs
+from pop_core.tracking.limbs import contradicted_joints, limbs_in_the_open, loosened, lost_limbs
 from pop_core.tracking.liveliness import followed_trail, liveliness
 from pop_core.tracking.motion import N_MOVING
 from pop_core.tracking.rivals import BETTER, costs, follow_alternatives
@@ -49,6 +49,7 @@ TRUSTED_SUPPORT = 0.5
 # be taken for another (`python -m benchmarks tracking`, coverage rows).
 OVERSURE = 1.36
 HIDDEN_TURN_RAD = 0.5  # people hidden for a while come out much as they went in
+LESS_OPEN = 0.1  # share of a limb, by which a better place for it shows through less
 RESOLVED = 8.0  # cost that a body may be worse by for each joint that agrees with it instead
 
 
@@ -58,7 +59,7 @@ class Follower:
     def __init__(self, pipeline: BodyPipeline, config: TrackingConfig) -> None:
         """Use a pipeline's model, fitter and settings."""
         self.pipeline, self.config = pipeline, config
-        self.warm = WarmStart(pipeline.fitter)
+        self.warm = WarmStart(pipeline.fitter, config.prior_weight)
         self.limb_search = LimbSearch(pipeline.fitter.prior)
 
     def predict(self, track: PersonTrack, now_ns: int) -> None:
@@ -68,6 +69,7 @@ class Follower:
         joints = self._body(track.filter).joints
         track.trail = followed_trail(
             joints if track.trail is None else track.trail, joints, track.gap_s)
+        track.left_m = float(np.linalg.norm(joints - track.trail, axis=1).max())
         lively = liveliness(joints, track.trail, track.joint_state)
         track.filter = predict(track.filter, self.pipeline.model, track.gap_s, lively)
         for other in track.alternatives:
@@ -91,6 +93,7 @@ class Follower:
             rival: A fit that knows nothing of the track, where the prediction is in doubt.
         """
         body = self._body(track.filter)
+        track.blur_m = float(scene.noise.sigma_m(body.joints[:1, 2])[0])
         if lifted is not None:
             track.misnamed = misnamed_joints(body.landmarks, lifted)
             lifted = renamed(lifted, track.misnamed)
@@ -181,8 +184,11 @@ class Follower:
     def _without_lost_limbs(
         self, track: PersonTrack, fit: WarmFit, observation: Observation, lifted: LiftedJoints
     ) -> WarmFit:
-        """Look anew for arms or legs that keypoints contradict; return the better fit."""
+        """Look anew for limbs that keypoints contradict, or depth; return the better fit."""
         for loose in lost_limbs(contradicted_joints(fit.state, lifted)):
+            fit = self._with_limb_found(track, fit, observation, lifted, loose)
+        for loose in limbs_in_the_open(
+                open_shares(fit.state, fit.visibility, observation)):
             fit = self._with_limb_found(track, fit, observation, lifted, loose)
         return fit
 
@@ -198,10 +204,14 @@ class Follower:
             free, observation, self.config.steps, detected=True, loose=loose)
         ours, theirs = costs(self.warm.fitter, [fit, other], observation)
         before, after = (contradicted_joints(f.state, lifted).sum() for f in (fit, other))
-        # A keypoint may itself be wrong: a limb is where measured points are its own.
+        # A keypoint may itself be wrong: a limb is where measured points are its own, and not
+        # where the camera saw through.
         limbs = limbs_of(loose)
         is_seen = other.of_limb[limbs].sum() > fit.of_limb[limbs].sum()
-        if theirs >= ours + RESOLVED * int(before - after) or not is_seen:
+        opened, closed = (
+            open_shares(f.state, f.visibility, observation)[limbs].max() for f in (fit, other))
+        is_hidden = closed < opened - LESS_OPEN
+        if theirs >= ours + RESOLVED * int(before - after) or not (is_seen or is_hidden):
             return fit
         track.filter = free
         return other
@@ -259,9 +269,8 @@ class Follower:
         track.note_unseen(sighting(visibility).contradicted < CONTRADICTED, self.config)
         if not track.is_shown:
             return None
-        config = self.pipeline.config.fitting
         hessian = inverse(track.filter.covariance) + prior_curvature(
-            state, self.pipeline.fitter.prior, config.prior_weight)
+            state, self.pipeline.fitter.prior, self.config.prior_weight)
         turns = np.arange(3, N_MOVING)
         hessian[turns, turns] += HIDDEN_TURN_RAD**-2.0
         body = BodyFit(

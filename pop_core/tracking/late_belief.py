@@ -12,6 +12,8 @@ from pop_core.geometry.camera import Camera
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.tracking.body_filter import FilterState, predict
 
+FASTEST_M_S = 1.5  # nobody who walks goes on faster: the rest of a long step was an error
+
 
 def moved_on(
     belief: FilterState, body: FitBody, late_s: float, lifted: LiftedJoints | None
@@ -44,7 +46,7 @@ def caught_up(
     points = body.state(predicted.parameters).landmarks[rows]
     step = np.median(lifted.positions_camera[rows] - points, axis=0)
     velocity = predicted.velocity.copy()
-    velocity[:3] += step / late_s
+    velocity[:3] += np.clip(step / late_s, -FASTEST_M_S, FASTEST_M_S)
     parameters = predicted.parameters.replaced(transl=predicted.parameters.transl + step)
     return replace(predicted, velocity=velocity, parameters=parameters)
 

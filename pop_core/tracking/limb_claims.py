@@ -18,6 +18,7 @@ from jaxtyping import Bool, Float, Int
 
 from pop_core.body.joints import JOINT_NAMES, SHARED_INDEX
 from pop_core.fitting.body_state import BodyState, FitBody
+from pop_core.fitting.depth_consistency import Visibility
 from pop_core.fitting.limb_points import KINDS
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import Pairs
@@ -29,6 +30,7 @@ ARM_LIMBS = (0, 1)
 ENDS = np.array([SHARED_INDEX[JOINT_NAMES[limb[2]]] for limb in LIMBS])  # wrists and ankles
 TRUNK_SIGMA_M = 0.02  # cloth, and the place of what is surer
 RIM_PX = 5  # cloth and hair make a body wider than its model
+OPEN_M = 0.08  # in front of what is measured
 HIDDEN_SHARE, FEWEST_POINTS = 0.5, 20.0
 
 
@@ -54,6 +56,22 @@ def parts_of(body: FitBody) -> tuple[Int[np.ndarray, 'n'], Int[np.ndarray, 'm']]
     limb_of_vertex = LIMB_OF_BONE[body.main_bone]
     limb_of_face = limb_of_vertex[body.faces].max(axis=1)
     return limb_of_vertex, np.where(limb_of_face < 0, TRUNK, limb_of_face)
+
+
+def open_shares(
+    state: BodyState, visibility: Visibility, observation: Observation
+) -> Float[np.ndarray, '4']:
+    """Return the share of each limb, of what is toward the camera, that the camera saw through."""
+    facing = visibility.facing
+    # Beside the rim of a limb the camera sees what is behind it.
+    nearest_m = cv2.erode(np.nan_to_num(observation.depth_m), np.ones((3, 3), np.uint8))
+    around = replace(observation, depth_m=nearest_m)
+    gap_m = around.depth_at(state.vertices[facing])[0] - state.vertices[facing, 2]
+    through = np.isfinite(gap_m) & (gap_m > OPEN_M)
+    limb = parts_of(state.body)[0][facing]
+    count = np.array([(limb == number).sum() for number in range(len(LIMBS))])
+    opened = np.array([through[limb == number].sum() for number in range(len(LIMBS))])
+    return np.asarray(opened / np.maximum(count, 1))
 
 
 class LimbClaims:

@@ -77,4 +77,18 @@ def _keypoint_cost(
     guessed = own[rays.joint]
     across = np.einsum('nkc,nc->nk', rays.across[guessed], state.landmarks[rays.joint[guessed]])
     squared = np.square(offset).sum() + rays.score[guessed] @ np.square(across).sum(axis=1)
-    return float(squared) / NEAR_M**2
+    return float(squared + _in_the_open(state, observation, loose)) / NEAR_M**2
+
+
+def _in_the_open(
+    state: BodyState, observation: Observation, loose: Bool[np.ndarray, '24']
+) -> float:
+    """Return the sum of squares of how far the loose joints stand before what is measured [m^2].
+
+    Nobody knows where a hidden limb is; but not where the camera saw through it.
+    """
+    joints = state.joints[loose]
+    gap_m = observation.depth_at(joints)[0] - joints[:, 2]
+    # Nothing is known of what lies outside the window.
+    open_m = np.where(np.isfinite(gap_m), np.clip(gap_m, 0.0, WIDE_M), 0.0)
+    return float(np.square(open_m).sum())

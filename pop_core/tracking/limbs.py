@@ -15,11 +15,13 @@ from pop_core.body.joints import JOINT_INDEX, N_JOINTS, SHARED_NAMES
 from pop_core.fitting.body_state import BodyState
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.tracking.body_filter import FilterState
+from pop_core.tracking.limb_claims import ARM_LIMBS
 
 STRANGE_M = 0.18  # a keypoint this far from the body, and surely lifted, contradicts it
 SURE_SCORE = 0.55
 SIGMAS = 4.0
 LOOSE_RAD = 0.8
+MOST_OPEN = 0.15  # of a limb: what the camera saw through was not there
 ARM, LEG = ('collar', 'shoulder', 'elbow', 'wrist'), ('hip', 'knee', 'ankle')
 LIMB_OF = {'elbow': ARM, 'wrist': ARM, 'knee': LEG, 'ankle': LEG}
 
@@ -45,6 +47,19 @@ def lost_limbs(contradicted: Bool[np.ndarray, 's']) -> list[Bool[np.ndarray, '24
             bones = found.setdefault(parts, np.zeros(N_JOINTS, dtype=bool))
             bones[[JOINT_INDEX[f'{side}_{part}'] for part in parts]] = True
     return list(found.values())
+
+
+def limbs_in_the_open(open_share: Float[np.ndarray, '4']) -> list[Bool[np.ndarray, '24']]:
+    """Return the joints of each limb that stands where the camera saw through too much of it."""
+    return [_joints_of(number) for number in np.flatnonzero(open_share > MOST_OPEN).tolist()]
+
+
+def _joints_of(limb: int) -> Bool[np.ndarray, '24']:
+    side = 'left' if limb % 2 == 0 else 'right'
+    parts = ARM if limb in ARM_LIMBS else LEG
+    bones = np.zeros(N_JOINTS, dtype=bool)
+    bones[[JOINT_INDEX[f'{side}_{part}'] for part in parts]] = True
+    return bones
 
 
 def loosened(predicted: FilterState, bones: Bool[np.ndarray, '24']) -> FilterState:

@@ -59,6 +59,8 @@ class PersonTrack:
         tries: Bodies that were taken over since a look last agreed with one.
         restarted_ns: When the body was last looked for anew.
         trail: Where the joints were of late, None before the second frame [m].
+        left_m: How far any joint has left it.
+        blur_m: Noise of the depth image where the person is.
         depth_level: E_depth that is usual for this person [m].
         alternatives: Other explanations.
         shown: Parameters given out last.
@@ -85,6 +87,8 @@ class PersonTrack:
     tries: int = 1
     restarted_ns: int = 0
     trail: Float[np.ndarray, '24 3'] | None = None
+    left_m: float = 0.0
+    blur_m: float = 0.0
     depth_level: float | None = None
     alternatives: list[Alternative] = field(default_factory=list)
     shown: BodyParameters | None = None

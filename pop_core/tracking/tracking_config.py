@@ -19,6 +19,10 @@ class TrackingConfig:
     steps: int = setting(
         2, minimum=1, maximum=20,
         about='Steps of the fit from the predicted body.')
+    prior_weight: float = setting(
+        1.0, minimum=0.0, maximum=100.0,
+        about='Weight of the learned pose prior on people who are followed; 1 is the prior as it '
+        'was learned.')
     gate_m: float = setting(
         0.35, unit='m', minimum=0.05, maximum=3.0,
         about='Farthest that detected joints may lie from predicted ones, beside the doubt of '

@@ -115,9 +115,9 @@ def updated(predicted: FilterState, fit: WarmFit) -> FilterState:
 class WarmStart:
     """Follows bodies of one model from predictions."""
 
-    def __init__(self, fitter: BodyFitter) -> None:
-        """Use the terms and settings of a fitter."""
-        self.fitter = fitter
+    def __init__(self, fitter: BodyFitter, prior_weight: float) -> None:
+        """Use the terms and settings of a fitter, and another weight of the pose prior."""
+        self.fitter, self.prior_weight = fitter, prior_weight
 
     def fit(
         self, predicted: FilterState, observation: Observation, steps: int, *, detected: bool,
@@ -139,7 +139,7 @@ class WarmStart:
         state, visibility = start.state, start.visibility
         prediction = Prediction(predicted, state)
         weights = TermWeights(
-            JOINTS_WEIGHT if detected else 0.0, self.fitter.config.prior_weight, 0.0)
+            JOINTS_WEIGHT if detected else 0.0, self.prior_weight, 0.0)
         surprised = loose is not None or (
             detected and farthest_joint_m(state, observation) > SURPRISE_M)
         scales_m = np.hypot(

@@ -8,9 +8,11 @@ from support.one_person import lift_truth, photograph
 from pop_core.body.joints import JOINT_INDEX, N_SHARED, SHARED_INDEX
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.fitting.body_state import BodyState, FitBody
+from pop_core.fitting.depth_consistency import see_body
 from pop_core.fitting.observation import Observation, observe
 from pop_core.fitting.residuals import Pairs
-from pop_core.tracking.limb_claims import LIMB_OF_BONE, LimbClaims, limbs_of
+from pop_core.tracking.limb_claims import LIMB_OF_BONE, LimbClaims, limbs_of, open_shares
+from pop_core.tracking.limbs import limbs_in_the_open
 
 LEFT_ARM, RIGHT_ARM, LEFT_LEG = 0, 1, 2
 N_POINTS = 60
@@ -105,3 +107,16 @@ def test_joints_belong_to_limbs_and_those_of_the_trunk_to_none():
     assert limbs_of(bones).tolist() == []
     bones[[JOINT_INDEX['right_wrist'], JOINT_INDEX['left_knee']]] = True
     assert limbs_of(bones).tolist() == [RIGHT_ARM, LEFT_LEG]
+
+
+def test_a_limb_where_the_camera_sees_the_wall_stands_in_the_open(
+    body: BodyModel, person: BodyParameters, state: BodyState, observation: Observation
+):
+    assert limbs_in_the_open(open_shares(state, see_body(state, observation), observation)) == []
+    stretched = person.body_pose.copy()
+    stretched[JOINT_INDEX['right_shoulder'] - 1] = 0.0  # away from the trunk, as in the T-pose
+    elsewhere = FitBody(body, full=False).state(person.replaced(body_pose=stretched))
+    share = open_shares(elsewhere, see_body(elsewhere, observation), observation)
+    assert share[RIGHT_ARM] > 0.5
+    (arm,) = limbs_in_the_open(share)
+    np.testing.assert_array_equal(limbs_of(arm), [RIGHT_ARM])
