@@ -47,6 +47,11 @@ class DetectionSchedule:
         self._config = config
         self._frames_since = config.detect_every
 
+    @property
+    def has_looked(self) -> bool:
+        """Return whether the present frame is looked at, now or meanwhile."""
+        return self._frames_since == 0
+
     def is_due(
         self, tracks: Sequence[PersonTrack], gap: Gap, *, is_busy: bool = False,
         is_late: bool = False, is_looking: bool = False,

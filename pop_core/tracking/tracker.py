@@ -158,7 +158,7 @@ class BodyTracker:
             if look is not None:
                 count_misses(track, glimpse is not None)
             estimate = self._continue(track, scene, glimpse, expected[row], watch)
-            if look is not None:
+            if self._schedule.has_looked:
                 track.note_look()
             if estimate is not None:
                 bodies.append(estimate)

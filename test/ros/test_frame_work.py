@@ -1,5 +1,6 @@
 """A fault of the node itself is counted, told and survived."""
 
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from pop_core.config import PipelineConfig
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.openpose_json import OpenPoseJsonDetector
 from pop_core.rgbd import RgbdFrame
+from pop_ros.frame_fitter import FrameFitter
 from pop_ros.frame_work import FrameWork
 from pop_ros.inputs import RgbdMessages
 from pop_ros.node_config import NodeConfig
@@ -37,15 +39,17 @@ class Faulty:
         return []
 
 
-class Counted(OpenPoseJsonDetector):
-    """A keypoint source that knows which frames it was asked for."""
+class Stuck(OpenPoseJsonDetector):
+    """A keypoint source that takes its time after some answers, and is then told to go on."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, answers: int) -> None:
         super().__init__(folder)
-        self.asked: list[int] = []
+        self.left, self.go_on = answers, threading.Event()
 
     def detect(self, frame: RgbdFrame) -> list[Detection]:
-        self.asked.append(frame.stamp_ns)
+        self.left -= 1
+        if self.left < 0:
+            self.go_on.wait(60.0)
         return super().detect(frame)
 
 
@@ -86,17 +90,21 @@ def test_frames_after_a_fault_are_fitted_and_the_fault_is_counted(
 
 
 def test_frames_that_nobody_had_time_for_do_not_make_a_camera_slow(
-    node: LifecycleNode, tmp_path: Path
+    node: LifecycleNode, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recording = record(tmp_path, n_frames=6, rate_hz=15.0)
-    statistics, detector = NodeStatistics(), Counted(recording.keypoints)
+    statistics, detector = NodeStatistics(), OpenPoseJsonDetector(recording.keypoints)
+    told, fit = [], FrameFitter.fit
+    monkeypatch.setattr(
+        FrameFitter, 'fit',
+        lambda *args, skipped, **named: told.append(skipped) or fit(
+            *args, skipped=skipped, **named))
     settings = ConfigParameters(node, NodeConfig(lazy=False), PipelineConfig(), lambda: None)
     work = FrameWork(
         node, settings, detector, StaticFrames(), NodeOutputs(node), statistics)
     with Listener() as clock:
         assert clock.spin_until(lambda: work.is_ready, 120)
         work.run(True)
-        # In every second frame people are looked for, until they are known for sure.
         for number in (1, 2, 3, 6):
             frame, stamp = recording.scenes[number - 1].frame, recording.stamps[number - 1]
             work.put(RgbdMessages(
@@ -106,4 +114,29 @@ def test_frames_that_nobody_had_time_for_do_not_make_a_camera_slow(
     assert work.stop(10)
     assert statistics.snapshot().frames == 4
     # The sixth lies 0.2 s behind the third, as from a camera of 5 Hz, all of whose frames count.
-    assert detector.asked == [recording.stamps[0], recording.stamps[2]]
+    assert told == [0, 0, 0, 2]
+
+
+def test_people_are_followed_while_the_keypoint_source_thinks(
+    node: LifecycleNode, tmp_path: Path
+) -> None:
+    recording = record(tmp_path, n_frames=12, rate_hz=15.0)
+    statistics, detector = NodeStatistics(), Stuck(recording.keypoints, answers=2)
+    settings = ConfigParameters(node, NodeConfig(lazy=False), PipelineConfig(), lambda: None)
+    work = FrameWork(
+        node, settings, detector, StaticFrames(), NodeOutputs(node), statistics)
+    with Listener() as clock:
+        assert clock.spin_until(lambda: work.is_ready, 120)
+        work.run(True)
+        for number, (scene, stamp) in enumerate(
+                zip(recording.scenes, recording.stamps, strict=True), start=1):
+            frame = scene.frame
+            work.put(RgbdMessages(
+                image(frame.rgb, 'rgb8', stamp), depth_image(frame.depth_m, '16UC1', stamp),
+                camera_info(frame.camera, stamp), 0.0, number=number))
+            assert clock.spin_until(lambda: statistics.snapshot().pending == 0, 20)
+        assert detector.left < 0  # it was asked, and has not answered
+        assert statistics.snapshot().frames == 12
+        detector.go_on.set()
+        assert work.stop(20)
+    assert statistics.snapshot().refused == 0

@@ -168,7 +168,9 @@ def test_no_look_is_due_while_one_is_made() -> None:
     schedule = DetectionSchedule(TrackingConfig(detect_every=2))
     quick = Gap(1 / 30)
     assert not schedule.is_due([], quick, is_looking=True)
+    assert not schedule.has_looked
     assert schedule.is_due([], quick)
+    assert schedule.has_looked
 
 
 def test_carried_joints_keep_their_errors_and_their_pixels_follow(
