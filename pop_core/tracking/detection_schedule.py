@@ -13,6 +13,7 @@ from pop_core.tracking.tracking_config import TrackingConfig
 LONG_GAP_S = 0.12  # between two frames of a camera: people move far, and there is time to look
 # Noise of depth as wide as a limb is thick does not tell where one moves to.
 BLURRED_M, MOVING_M = 0.028, 0.05
+MOST_TRIES = 3  # whom looks go on contradicting is no news any more
 SOON = 2  # frames from one look to the next while somebody is not followed well
 
 
@@ -71,7 +72,7 @@ class DetectionSchedule:
         every = self._config.detect_every
         if any(_needs_a_look(track) for track in tracks):
             every = min(every, SOON)
-        if any(track.tries > 0 or _has_come_out(track) for track in tracks):
+        if any(_is_unproven(track) or _has_come_out(track) for track in tracks):
             every = 1
         # A look of our own that took long is no reason for the next.
         after_gap = gap.is_long and (gap.is_of_slow_camera or self._frames_since > 1)
@@ -88,6 +89,11 @@ def _has_come_out(track: PersonTrack) -> bool:
     """
     seen = track.joint_state == JointState.VISIBLE
     return bool((seen & track.hidden_at_look)[SHARED].any())
+
+
+def _is_unproven(track: PersonTrack) -> bool:
+    """Return whether no look has agreed with a body yet that was found a moment ago."""
+    return track.is_shown and 0 < track.tries <= MOST_TRIES
 
 
 def _needs_a_look(track: PersonTrack) -> bool:

@@ -32,7 +32,7 @@ from pop_core.tracking.limb_search import LimbSearch
 from pop_core.tracking.limbs import contradicted_joints, limbs_in_the_open, loosened, lost_limbs
 from pop_core.tracking.liveliness import followed_trail, liveliness
 from pop_core.tracking.motion import N_MOVING
-from pop_core.tracking.rivals import BETTER, costs, follow_alternatives
+from pop_core.tracking.rivals import BETTER, MUCH_BETTER, costs, follow_alternatives
 from pop_core.tracking.sides import misnamed_joints, renamed, without_joints
 from pop_core.tracking.track import Alternative, PersonTrack
 from pop_core.tracking.track_view import observe_track
@@ -47,7 +47,7 @@ UNUSUAL, UNUSUAL_M = 1.5, 0.01  # E_depth above this many times the usual and th
 TRUSTED_SUPPORT = 0.5
 # Standard deviations are wider than the filter's own by this: frames err together, and a limb may
 # be taken for another (`python -m benchmarks tracking`, coverage rows).
-OVERSURE = 1.36
+OVERSURE = 1.3
 HIDDEN_TURN_RAD = 0.5  # people hidden for a while come out much as they went in
 LESS_OPEN = 0.1  # share of a limb, by which a better place for it shows through less
 RESOLVED = 8.0  # cost that a body may be worse by for each joint that agrees with it instead
@@ -161,8 +161,8 @@ class Follower:
         belief = self._found_anew(track, rival, observation.lifted)
         other = self.warm.fit(belief, observation, self.config.steps, detected=True)
         ours, theirs = costs(self.warm.fitter, [fit, other], observation)
-        # Who was followed well is more than what one frame says of them.
-        if theirs >= ours - (0.0 if track.tries > 0 else BETTER):
+        # Keypoints of one frame err together: who was followed well is believed more than them.
+        if theirs >= ours - (BETTER if track.tries > 0 else MUCH_BETTER):
             track.tries += track.tries > 0
             return fit
         track.tries += 1

@@ -19,6 +19,7 @@ from pop_core.tracking.warm_start import WarmFit, WarmStart, updated
 SAME_M = 0.04  # explanations nearer to each other than this, mean over joints, are one
 DECIDED = 40.0  # summed cost that decides between two of them
 BETTER = 8.0  # summed cost by which another must be better to take over
+MUCH_BETTER = 15.0  # the same in a single frame, for who was followed well
 LARGEST = 10.0  # of one frame: no single frame decides
 
 

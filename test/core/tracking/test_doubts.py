@@ -92,3 +92,17 @@ def test_a_joint_that_comes_out_is_looked_at_in_the_next_frame(track: PersonTrac
     assert schedule.is_due([track], FRAME)
     track.note_look()
     assert not schedule.is_due([track], FRAME)
+
+
+def test_a_body_that_no_look_agreed_with_is_looked_at_in_every_frame_for_a_moment(
+    track: PersonTrack
+) -> None:
+    schedule = DetectionSchedule(TrackingConfig(detect_every=5))
+    track.note_look()
+    schedule.is_due([track], FRAME)
+    track.tries = 1
+    assert schedule.is_due([track], FRAME)
+    track.tries = 9
+    assert not schedule.is_due([track], FRAME)
+    track.tries, track.state = 1, TrackState.LOST
+    assert not schedule.is_due([track], FRAME)
