@@ -102,7 +102,7 @@ def test_a_body_that_no_look_agreed_with_is_looked_at_in_every_frame_for_a_momen
     schedule.is_due([track], FRAME)
     track.tries = 1
     assert schedule.is_due([track], FRAME)
-    track.tries = 9
+    track.state = TrackState.LOST
     assert not schedule.is_due([track], FRAME)
-    track.tries, track.state = 1, TrackState.LOST
+    track.tries, track.state = 9, TrackState.TRACKED
     assert not schedule.is_due([track], FRAME)
