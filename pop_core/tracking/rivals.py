@@ -26,13 +26,20 @@ LARGEST = 10.0  # of one frame: no single frame decides
 def costs(
     fitter: BodyFitter, fits: Sequence[WarmFit], observation: Observation
 ) -> list[float]:
-    """Return the cost of each body by E_depth, keypoints and priors, on common pixels."""
-    hypotheses = [
-        Hypothesis(
-            fit.state, PriorBelief(fitter.prior, fit.state.parameters.body_pose, np.ones(23)))
-        for fit in fits]
+    """Return the cost of each fit by E_depth, keypoints and priors, on common pixels."""
     common: Bool[np.ndarray, 'h w'] = np.mean([fit.segment for fit in fits], axis=0) >= 0.5
-    fitter.steps.score(hypotheses, observation, common)
+    return costs_over(fitter, [fit.state for fit in fits], observation, common)
+
+
+def costs_over(
+    fitter: BodyFitter, bodies: Sequence[BodyState], observation: Observation,
+    segment: Bool[np.ndarray, 'h w'],
+) -> list[float]:
+    """Return the cost of each body by E_depth over some pixels, keypoints and priors."""
+    hypotheses = [
+        Hypothesis(body, PriorBelief(fitter.prior, body.parameters.body_pose, np.ones(23)))
+        for body in bodies]
+    fitter.steps.score(hypotheses, observation, segment)
     return [hypothesis.cost for hypothesis in hypotheses]
 
 
