@@ -80,8 +80,15 @@ def assemble(blocks: Sequence[Residual], size: int) -> NormalEquations:
         r[rows] = root * block.r
         row = rows.stop
     # dsyrk forms one triangle only, half the work of a product; once, not block by block.
-    upper = np.triu(blas.dsyrk(1.0, J.T, lower=0)) if count else np.zeros((size, size))
-    return NormalEquations(cost_of(blocks), J.T @ r, upper + np.triu(upper, 1).T)
+    upper = blas.dsyrk(1.0, J.T, lower=0) if count else np.zeros((size, size))
+    return NormalEquations(cost_of(blocks), J.T @ r, with_lower(upper))
+
+
+def with_lower(upper: Float[np.ndarray, 'x x']) -> Float[np.ndarray, 'x x']:
+    """Return the symmetric matrix of an upper triangle that has zeros below."""
+    out = upper + upper.T
+    out[np.diag_indices(len(out))] = np.diag(upper)
+    return np.asarray(out)
 
 
 def damped_step(

@@ -16,6 +16,7 @@ from scipy.linalg import lapack
 
 from pop_core.body.kinematics import increment, pose_skeleton
 from pop_core.body.model import BodyModel, BodyParameters
+from pop_core.fitting.levenberg_marquardt import with_lower
 from pop_core.geometry.rotation import from_rotvec, to_rotvec
 from pop_core.tracking.motion import (
     BETA_DRIFT,
@@ -176,8 +177,7 @@ def inverse(matrix: Float[np.ndarray, 'x x']) -> Float[np.ndarray, 'x x']:
     factor, failed = lapack.dpotrf(jittered, overwrite_a=1)
     if failed:
         raise np.linalg.LinAlgError(f'expected a positive definite matrix, found {matrix}')
-    upper = np.triu(lapack.dpotri(factor, overwrite_c=1)[0])
-    return np.asarray(upper + np.triu(upper, 1).T)
+    return with_lower(lapack.dpotri(factor, overwrite_c=1)[0])
 
 
 def _symmetric(matrix: Float[np.ndarray, 'x x']) -> Float[np.ndarray, 'x x']:
