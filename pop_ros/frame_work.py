@@ -100,14 +100,14 @@ class FrameWork:
         return answer
 
     def stop(self, timeout_s: float) -> bool:
-        """End the thread; return whether the frame in work was finished in time."""
+        """End the threads; return whether frame and look in work were finished in time."""
         self.run(False)
         if self._worker.mailbox.clear():
             self._statistics.add_drop(STOPPED)
         finished = self._worker.stop(timeout_s)
         self._finding.stop()
-        self._looking.stop()
-        return finished
+        # Who waits for an answer in vain shall not wait twice.
+        return self._looking.stop(timeout_s if finished else 0.0) and finished
 
     # Worker thread
 

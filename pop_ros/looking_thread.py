@@ -22,7 +22,8 @@ class LookingThread:
     def __init__(self) -> None:
         """Start the thread."""
         self._jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
-        threading.Thread(target=self._work, name='pop looking', daemon=True).start()
+        self._thread = threading.Thread(target=self._work, name='pop looking', daemon=True)
+        self._thread.start()
 
     def submit(self, look: Callable[[], AnswerT]) -> Future[AnswerT]:
         """Have something done; its error, if any, is the future's."""
@@ -30,9 +31,11 @@ class LookingThread:
         self._jobs.put((future, look))
         return future
 
-    def stop(self) -> None:
-        """End the thread once what was submitted is done."""
+    def stop(self, timeout_s: float) -> bool:
+        """End the thread once what was submitted is done; return whether it was in time."""
         self._jobs.put(None)
+        self._thread.join(timeout_s)
+        return not self._thread.is_alive()
 
     def _work(self) -> None:
         while (job := self._jobs.get()) is not None:

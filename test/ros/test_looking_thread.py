@@ -22,7 +22,7 @@ def test_questions_are_answered_in_order_by_one_other_thread() -> None:
     assert answered == list(range(20))
     thread, = {answer.result() for answer in answers}
     assert thread != threading.get_ident()
-    looking.stop()
+    assert looking.stop(WAIT_S)
 
 
 def test_an_error_belongs_to_its_question_alone() -> None:
@@ -31,16 +31,24 @@ def test_an_error_belongs_to_its_question_alone() -> None:
     with pytest.raises(ZeroDivisionError):
         failed.result(WAIT_S)
     assert good.result(WAIT_S) == 2
-    looking.stop()
+    assert looking.stop(WAIT_S)
 
 
 def test_a_stopped_thread_ends_once_its_work_is_done() -> None:
     before = threading.active_count()
     looking = LookingThread()
-    last = looking.submit(threading.current_thread)
-    looking.stop()
-    last.result(WAIT_S).join(WAIT_S)
+    last = looking.submit(threading.get_ident)
+    assert looking.stop(WAIT_S)
+    assert last.done()
     assert threading.active_count() == before
+
+
+def test_a_thread_that_still_thinks_is_said_to() -> None:
+    looking, go_on = LookingThread(), threading.Event()
+    answer = looking.submit(go_on.wait)
+    assert not looking.stop(0.01)
+    go_on.set()
+    assert answer.result(WAIT_S)
 
 
 def test_a_source_that_never_answers_keeps_no_program_alive() -> None:
