@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pop_core.body.joints import N_JOINTS, PARENTS
+from pop_core.body.joints import JOINT_NAMES, N_JOINTS, PARENTS
 from pop_core.estimate import JointState
 
 TRAIL_S = 0.15  # how fast the past is forgotten
 TURN_RAD, SHIFT_M = 0.04, 0.016  # away from its past, a part moves; sensors shake by less
-SHORT_M = 0.15  # noise of the ends of a short bone turns it far
+SHORT_M, TIP_M = 0.15, 0.3  # noise of the ends of a short bone turns it far, a hand most
 LEAST = 0.03  # of the velocity noise: nobody is a statue
 
 
@@ -32,6 +32,8 @@ def _own_bones() -> Bool[np.ndarray, '24 24']:
 
 
 OWN = _own_bones()
+LEAST_LENGTH_M = np.array([
+    TIP_M if name.endswith(('hand', 'foot')) else SHORT_M for name in JOINT_NAMES])
 # A turn about a bone moves only what follows.
 SHOWN_BY = OWN | (OWN.astype(np.int64) @ OWN > 0)
 
@@ -55,7 +57,7 @@ def liveliness(
         joint_state: A JointState per joint.
     """
     left, start = joints - trail, np.maximum(PARENTS, 0)
-    length = np.maximum(np.linalg.norm(joints - joints[start], axis=1), SHORT_M)
+    length = np.maximum(np.linalg.norm(joints - joints[start], axis=1), LEAST_LENGTH_M)
     of_bone = np.linalg.norm(left - left[start], axis=1) / length / TURN_RAD
     seen = joint_state == JointState.VISIBLE
     turned = np.where(SHOWN_BY & seen, of_bone, 0.0).max(axis=1)
