@@ -39,6 +39,11 @@ class DepthLayers:
         """Return which keypoints have a surface under them."""
         return np.asarray(self.present.any(axis=1))
 
+    @property
+    def middle_m(self) -> float:
+        """Return the median depth of all surfaces [m]; inf without any."""
+        return float(np.median(self.depth_m[self.present])) if self.present.any() else np.inf
+
 
 def find_layers(
     depth_m: Float32[np.ndarray, 'h w'],

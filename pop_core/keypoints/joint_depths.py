@@ -1,8 +1,8 @@
 """The depth of every joint of one person, by exact inference on the skeleton tree.
 
 Each keypoint shows one or more surfaces. The joint lies behind one of them, or an occluder hides
-it, or the keypoint is wrong. Which of these is true for which joint is what bones decide: no bone
-is longer than a body's, and skin runs along it without a jump.
+it, or the keypoint is wrong. Which of these is true for which joint is what bones decide: none is
+much longer or shorter than a body's, and what was measured along it is its skin or hides it.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Float32, Int
 
-from pop_core.keypoints import lifting_kernels as kernels
+from pop_core.keypoints import lifting_kernels, skeleton_tree_kernels
+from pop_core.keypoints.bone_evidence import BONE_COSTS
 from pop_core.keypoints.depth_layers import DepthLayers
-from pop_core.keypoints.skeleton import LEGS, ORDER, PATH_M, linked
+from pop_core.keypoints.skeleton import LEGS, ORDER, PATH_M, TREE_PARENT, linked
 
 BIN_M = 0.03
 MAX_BINS = 320
@@ -27,7 +28,8 @@ BROKEN_BONE_COST = 8.0
 OCCLUDER_COST = 2.5  # a surface that stands clear in front of the one it should continue
 OCCLUDER_GAP_M = 0.25
 BONE_TOLERANCE_M = 0.05
-LEAN = 0.6  # spread of a bone's depth relative to its length, over varied poses
+SHORTEST = 0.75  # bone relative to the mean one: keypoints and skin err at both ends
+LEAN = 0.75  # spread of a bone's depth relative to its length, over varied poses
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,12 +41,14 @@ class JointLayers:
         depth_m: Depth of the joint behind each surface [m].
         sigma_m: Standard deviation of that depth [m].
         price: Cost of each surface in itself.
+        skin_m: Depth of each joint behind its skin [m].
     """
 
     layers: DepthLayers
     depth_m: Float[np.ndarray, 's l']
     sigma_m: Float[np.ndarray, 's l']
     price: Float[np.ndarray, 's l']
+    skin_m: Float[np.ndarray, 's']
 
 
 def layer_prices(
@@ -64,7 +68,7 @@ def layer_prices(
     gap_m = np.zeros(len(keypoints_px))
     for j in LEGS[links[LEGS] >= 0]:
         (u0, v0), (u1, v1) = keypoints_px[links[j]], keypoints_px[j]
-        jump_m = kernels.approach(depth_m, u0, v0, u1, v1, jump_ratio)
+        jump_m = lifting_kernels.approach(depth_m, u0, v0, u1, v1, jump_ratio)
         # What hides a knee hides the ankle below it, though no edge lies between them.
         gap_m[j] = gap_m[links[j]] + jump_m
         front = layers.depth_m[j] <= layers.depth_m[j][layers.share[j].argmax()]
@@ -76,7 +80,9 @@ def choose_depths(
     joints: JointLayers,
     rays: Float[np.ndarray, 's 2'],
     scores: Float[np.ndarray, 's'],
+    along: Float[np.ndarray, 's n 3'],
     size: float,
+    stretch: float,
 ) -> Float[np.ndarray, 's']:
     """Return the most probable depth of each joint [m], hidden ones included; NaN without surface.
 
@@ -84,20 +90,30 @@ def choose_depths(
         joints: Joint depths behind each surface.
         rays: (x/z, y/z) of each keypoint.
         scores: Confidence of each keypoint.
-        size: Longest bones relative to the mean bones of the default body.
+        along: Depth measured along each limb's bones [m].
+        size: Size of the person relative to the mean default body.
+        stretch: Longest bone relative to the mean one of that size.
     """
     present = joints.layers.present
     bins = _bins(joints.depth_m[present])
     usable = joints.layers.known
     links = linked(usable)
-    rows = np.arange(len(scores))
-    longest = np.where(links >= 0, PATH_M[rows, links], 1.0) * size
     order = np.array([j for j in ORDER if usable[j]])
     chosen = np.zeros(len(scores), dtype=np.int64)
-    kernels.tree_depths(
-        _unary(joints, bins, scores), bins, rays, links, order, longest, BONE_TOLERANCE_M, LEAN,
-        BROKEN_BONE_COST, chosen)
+    skeleton_tree_kernels.tree_depths(
+        _unary(joints, bins, scores), bins, rays, links, order, _limits(links, size, stretch),
+        BONE_TOLERANCE_M, BROKEN_BONE_COST, along, joints.skin_m, BONE_COSTS, chosen)
     return np.where(usable, bins[chosen], np.nan)
+
+
+def _limits(
+    links: Int[np.ndarray, 's'], size: float, stretch: float
+) -> Float[np.ndarray, 's 3']:
+    """Return shortest and longest distance of each joint to its link, spread of its depth [m]."""
+    path = size * np.where(links >= 0, PATH_M[np.arange(len(links)), links], 1.0)
+    # Across a joint that was not found, the way may bend as it likes.
+    shortest = np.where(links == TREE_PARENT, SHORTEST * path, 0.0)
+    return np.column_stack([shortest, stretch * path, LEAN * path])
 
 
 def nearest_layer(
@@ -120,13 +136,18 @@ def _unary(
     joints: JointLayers, bins: Float[np.ndarray, 'm'], scores: Float[np.ndarray, 's']
 ) -> Float[np.ndarray, 's m']:
     """Return the cost of each joint at each depth; uncertain keypoints cost less."""
-    present, share = joints.layers.present, joints.layers.share
+    present = joints.layers.present
     sigma_m = np.hypot(joints.sigma_m, 0.5 * (bins[1] - bins[0]))
     gap = (bins - joints.depth_m[..., None]) / sigma_m[..., None]
     behind = 0.5 * gap**2 + joints.price[..., None]
-    # Something nearer than the joint hides it; a surface that fills the patch hides it best.
-    cost = HIDDEN_COST_GUESSED + (HIDDEN_COST_SURE - HIDDEN_COST_GUESSED) * scores
-    price_hidden = cost[:, None] - np.log(np.maximum(share, 1e-6))
-    hidden = np.where(gap > 0, price_hidden[..., None], np.inf)
+    hidden = np.where(gap > 0, hidden_price(joints.layers, scores)[..., None], np.inf)
     each = np.where(present[..., None], np.minimum(behind, hidden), np.inf)
     return np.minimum(each.min(axis=1), WRONG_COST) * (0.3 + 0.7 * scores[:, None])
+
+
+def hidden_price(
+    layers: DepthLayers, scores: Float[np.ndarray, 's']
+) -> Float[np.ndarray, 's l']:
+    """Return the cost of each surface hiding its joint; one that fills the patch hides it best."""
+    cost = HIDDEN_COST_GUESSED + (HIDDEN_COST_SURE - HIDDEN_COST_GUESSED) * scores
+    return np.asarray(cost[:, None] - np.log(np.maximum(layers.share, 1e-6)))

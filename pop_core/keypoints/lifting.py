@@ -8,16 +8,18 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pop_core.geometry.camera import Camera
+from pop_core.keypoints.bone_evidence import depths_along_bones
 from pop_core.keypoints.depth_layers import DepthLayers, find_layers
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.joint_depths import (
     JointLayers,
     choose_depths,
+    hidden_price,
     layer_prices,
     nearest_layer,
 )
 from pop_core.keypoints.lifted_joints import LiftedJoints, LiftState
-from pop_core.keypoints.skeleton import BONE_M, TREE_PARENT
+from pop_core.keypoints.skeleton import BONE_M, TREE_PARENT, linked
 from pop_core.keypoints.skeleton_checks import (
     with_guessed_limbs,
     without_broken_bones,
@@ -84,12 +86,14 @@ def lift_keypoints(
         config.patch_radius_m * frame.camera.fx, config.layer_gap)
     rays = frame.camera.unproject(pixels, np.ones(len(pixels)))[:, :2]
     prices = layer_prices(frame.depth_m, pixels, layers, config.layer_gap)
+    along = depths_along_bones(
+        frame.depth_m, pixels, linked(layers.known), frame.camera.fx / layers.middle_m)
     position = np.full((len(pixels), 3), np.nan)
     sigma_m = np.full(len(pixels), np.inf)
     state = np.full(len(pixels), int(LiftState.MISSING))
     if layers.known.any():
         position, sigma_m, state = _lift(
-            _View(frame, pixels, rays, scores, layers, prices), config)
+            _View(frame, pixels, rays, scores, layers, prices, along), config)
     lifted = LiftedJoints(position, sigma_m, state, keypoints_px, scores)
     return _with_given(detection, frame.camera, lifted)
 
@@ -119,6 +123,7 @@ class _View:
     scores: Float[np.ndarray, 's']
     layers: DepthLayers
     prices: Float[np.ndarray, 's l']
+    along: Float[np.ndarray, 's n 3']
 
 
 def _lift(
@@ -132,9 +137,10 @@ def _lift(
     rows = np.arange(len(view.scores))
     for _ in range(2):
         joints = _behind_skin(view, scale, facing_share, config)
-        depth_m = choose_depths(joints, view.rays, view.scores, scale * config.stretch)
+        depth_m = choose_depths(
+            joints, view.rays, view.scores, view.along, scale, config.stretch)
         chosen = nearest_layer(joints, depth_m)
-        state = _states(joints, depth_m, chosen)
+        state = _states(joints, depth_m, chosen, view.scores)
         at_joint = joints.depth_m[rows, chosen]
         position = np.column_stack([view.rays * at_joint[:, None], at_joint])
         scale = _size(position, state == LiftState.VISIBLE)
@@ -157,11 +163,12 @@ def _behind_skin(
     layers = view.layers
     offset_m, spread_m = skin_to_joint_m(facing_share)
     obliqueness = np.sqrt(1.0 + np.nan_to_num(view.rays**2).sum(axis=1))
-    offset_z = (scale * offset_m / obliqueness)[:, None]
+    offset_z = scale * offset_m / obliqueness
     noise = config.depth_noise * layers.depth_m**2
     sigma_m = np.sqrt((scale * spread_m[:, None]) ** 2 + noise**2 + layers.spread_m**2)
     return JointLayers(
-        layers, layers.depth_m + offset_z, np.maximum(sigma_m, 0.005), view.prices)
+        layers, layers.depth_m + offset_z[:, None], np.maximum(sigma_m, 0.005), view.prices,
+        offset_z)
 
 
 def _sigma_m(
@@ -182,7 +189,8 @@ def _sigma_m(
 
 
 def _states(
-    joints: JointLayers, depth_m: Float[np.ndarray, 's'], chosen: Int[np.ndarray, 's']
+    joints: JointLayers, depth_m: Float[np.ndarray, 's'], chosen: Int[np.ndarray, 's'],
+    scores: Float[np.ndarray, 's'],
 ) -> Int[np.ndarray, 's']:
     """Return the state of each joint at its most probable depth [m]."""
     rows = np.arange(len(depth_m))
@@ -190,9 +198,12 @@ def _states(
     present = joints.layers.present
     with np.errstate(invalid='ignore'):
         fits = np.abs(depth_m - at_layer) <= np.clip(GATE * sigma_m, *GATE_BOUNDS_M)
+        # Close behind an occluder is behind it.
+        hidden = hidden_price(joints.layers, scores) < joints.price
+        hidden = hidden[rows, chosen] & (depth_m > at_layer)
         nearer = np.any(present & (joints.depth_m < depth_m[:, None]), axis=1)
     state = np.where(nearer, int(LiftState.OCCLUDED), int(LiftState.OUTLIER))
-    state = np.where(fits, int(LiftState.VISIBLE), state)
+    state = np.where(fits & ~hidden, int(LiftState.VISIBLE), state)
     return np.where(joints.layers.known, state, int(LiftState.MISSING))
 
 

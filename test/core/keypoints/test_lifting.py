@@ -1,4 +1,3 @@
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -248,17 +247,5 @@ def test_the_inputs_are_left_as_they_were():
     lift_keypoints(body.frame, body.detection)
     assert np.array_equal(before[0], body.frame.depth_m)
     assert np.array_equal(before[1], body.detection.keypoints_px)
-
-
-def test_lifting_a_person_takes_milliseconds():
-    body = show(noise_px=3.0)
-    lift_keypoints(body.frame, body.detection)
-    times = []
-    for _ in range(15):
-        start = time.perf_counter()
-        lift_keypoints(body.frame, body.detection)
-        times.append(time.perf_counter() - start)
-    # 2 to 3 ms on an idle core; tests add shape checks and share the machine.
-    assert min(times) < 0.02
 
 
