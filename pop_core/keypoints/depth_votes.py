@@ -20,7 +20,7 @@ from pop_core.settings import setting
 
 TRUNK = np.array([SHARED_INDEX[name] for name in (
     'pelvis', 'left_hip', 'right_hip', 'neck', 'left_shoulder', 'right_shoulder')])
-BANDWIDTH_M = 0.15
+BANDWIDTH_M = 0.12
 SHIFTS = 4
 MOST_CELLS = 700  # of a trunk's search; more are thinned out
 NEAREST_M = 0.15   # votes before this have no pixel
