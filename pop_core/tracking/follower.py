@@ -193,11 +193,25 @@ class Follower:
     ) -> WarmFit:
         """Look anew for limbs that keypoints contradict, or depth; return the better fit."""
         for loose in lost_limbs(contradicted_joints(fit.state, lifted)):
-            fit = self._with_limb_found(track, fit, observation, lifted, loose)
+            fit = self._unless_it_rests(track, fit, observation, lifted, loose)
         for loose in limbs_in_the_open(
                 open_shares(fit.state, fit.visibility, observation)):
-            fit = self._with_limb_found(track, fit, observation, lifted, loose)
+            fit = self._unless_it_rests(track, fit, observation, lifted, loose)
         return fit
+
+    def _unless_it_rests(
+        self, track: PersonTrack, fit: WarmFit, observation: Observation, lifted: LiftedJoints,
+        loose: Bool[np.ndarray, '24'],
+    ) -> WarmFit:
+        """Look for a limb, but not in every frame for one that is never found."""
+        if track.limb_rests.rests(loose, track.now_ns):
+            return fit
+        other = self._with_limb_found(track, fit, observation, lifted, loose)
+        if other is fit:
+            track.limb_rests.missed(loose, track.now_ns)
+        else:
+            track.limb_rests.found(loose)
+        return other
 
     def _with_limb_found(
         self, track: PersonTrack, fit: WarmFit, observation: Observation, lifted: LiftedJoints,

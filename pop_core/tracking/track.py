@@ -11,6 +11,7 @@ from pop_core.body.joints import N_JOINTS, N_SHARED
 from pop_core.body.model import BodyParameters
 from pop_core.estimate import BodyEstimate, JointState, Track, TrackState
 from pop_core.tracking.body_filter import FilterState
+from pop_core.tracking.limb_rest import LimbRests
 from pop_core.tracking.tracking_config import TrackingConfig
 
 
@@ -63,6 +64,7 @@ class PersonTrack:
         blur_m: Noise of the depth image where the person is.
         depth_level: E_depth that is usual for this person [m].
         alternatives: Other explanations.
+        limb_rests: Limbs that were looked for in vain of late.
         shown: Parameters given out last.
     """
 
@@ -91,6 +93,7 @@ class PersonTrack:
     blur_m: float = 0.0
     depth_level: float | None = None
     alternatives: list[Alternative] = field(default_factory=list)
+    limb_rests: LimbRests = field(default_factory=LimbRests)
     shown: BodyParameters | None = None
 
     @property
