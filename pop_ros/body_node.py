@@ -1,7 +1,8 @@
 """The node `pop` itself: life cycle, inputs, worker, outputs, parameters, services, diagnostics.
 
-Callbacks only store; one worker thread fits the newest pair and publishes. The executor is
-single-threaded because rclpy's multi-threaded one spends a core on waiting.
+Callbacks only store; one worker thread fits the newest pair and publishes, another asks the
+keypoint source meanwhile. The executor is single-threaded because rclpy's multi-threaded one
+spends a core on waiting.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from pop_ros.tf_messages import tf2_msgs
 POLL_S = 0.05
 FOLLOW_S = 0.25
 REPORT_S = 1.0
-STOP_S = 5.0  # patience with the frame in work at shutdown
+STOP_S = 5.0  # patience at shutdown with the frame in work, and then with the look for people
 
 
 class PopNode(LifecycleNode):
@@ -148,7 +149,8 @@ class PopNode(LifecycleNode):
         self._inputs.leave()
         if self.stop():
             return TransitionCallbackReturn.SUCCESS
-        self.log.error(f'the frame in work did not end within {STOP_S:.0f} s')
+        self.log.error(
+            f'the frame in work, or the look for people, did not end within {STOP_S:.0f} s')
         return TransitionCallbackReturn.ERROR
 
     # Services and parameters
