@@ -1,6 +1,7 @@
 """What the ROS side costs: messages out, images in, and the way from camera to mesh.
 
     python -m benchmarks node [PART ...] [--people 1 3] [--seconds 20] [--keypoints SOURCE]
+                              [--json FILE]
     python -m benchmarks node soak --minutes 10
 
 Parts: messages (build and publish, per topic), inputs (pair and decode one VGA pair), latency (a
