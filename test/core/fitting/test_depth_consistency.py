@@ -4,6 +4,7 @@ from support.one_person import CAMERA, lift_truth, photograph
 
 from pop_core.body.joints import JOINT_INDEX
 from pop_core.body.model import BodyModel, BodyParameters
+from pop_core.fitting import sight_kernels
 from pop_core.fitting.body_state import FitBody
 from pop_core.fitting.depth_consistency import (
     HidingPlaces,
@@ -25,6 +26,11 @@ def look(body: BodyModel, person: BodyParameters, frame: RgbdFrame) -> Observati
 
 def body_pixels(body: BodyModel, person: BodyParameters, observation: Observation) -> np.ndarray:
     return observation.depth_m < 3.5
+
+
+def test_the_kernel_means_the_same_by_each_sight() -> None:
+    assert {sight.name: getattr(sight_kernels, sight.name) for sight in Sight} == {
+        sight.name: sight.value for sight in Sight}
 
 
 def test_the_true_body_contradicts_nothing(body: BodyModel, person: BodyParameters) -> None:

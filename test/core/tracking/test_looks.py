@@ -106,18 +106,20 @@ def test_somebody_new_begins_in_the_frame_that_was_looked_at(
     assert [body.track.id for body in stage.show(person, aside)] == [0, 1]
 
 
-def test_what_is_seen_of_a_time_before_a_reset_is_forgotten(
-    stage: Stage, slow: Slow, person: BodyParameters
+@pytest.mark.parametrize('is_reset', [True, False], ids=['reset', 'jump back in time'])
+def test_an_error_of_a_look_from_before_another_recording_is_nobodys(
+    stage: Stage, slow: Slow, person: BodyParameters, is_reset: bool
 ) -> None:
     stage.show(person, times=3)
-    (future, look), = slow.waiting
-    stage.tracker.reset()
+    (future, _), = slow.waiting
     slow.waiting.clear()
-    future.set_result(look)
+    future.set_exception(PopError('no keypoints'))
     slow.is_at_once = True
-    stage.source.people = []
-    away = stage.frame(hidden=True)
-    assert stage.tracker.process(replace(away, stamp_ns=away.stamp_ns + 1)).bodies == ()
+    if is_reset:
+        stage.tracker.reset()
+    else:
+        stage.stamp_ns = 0
+    assert off_m(stage, person) < NEAR_M
 
 
 def test_an_error_of_a_late_look_is_raised_once(
