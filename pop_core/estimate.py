@@ -106,7 +106,8 @@ class FrameResult:
         bodies: Fitted people, nearest first.
         statuses: One status per detection, in the detector's order; none in frames of a
             sequence that were followed without asking the detector.
-        times_ms: Wall time per step [ms].
+        times_ms: Wall time per step [ms]; of a look for people that was made beside the following,
+            in the frame that hears of it, so that the sum may exceed the frame's time.
     """
 
     bodies: tuple[BodyEstimate, ...]
