@@ -122,7 +122,8 @@ class FrameFitter:
 
         Raises:
             BadMessageError: If the messages make no frame.
-            PopError: If the keypoint source cannot read what it needs for this frame.
+            PopError: If the keypoint source cannot read what it needs for this frame, or could not
+                for an earlier one that was looked at meanwhile.
         """
         frame = self._maker.make(color, depth, info, depth_info)
         if self._tracker.config.enabled:

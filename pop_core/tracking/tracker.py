@@ -82,7 +82,8 @@ class BodyTracker:
             skipped: Frames of the camera since the last one that nobody had time for.
 
         Raises:
-            PopError: If the keypoint source cannot read what it needs for this frame.
+            PopError: If the keypoint source cannot read what it needs for this frame, or could not
+                for an earlier one that was looked at meanwhile.
         """
         watch = Stopwatch()
         if self._is_another_recording(frame):
