@@ -19,6 +19,7 @@ from pop_core.keypoints.skeleton import LEGS, ORDER, PATH_M, TREE_PARENT, linked
 
 BIN_M = 0.03
 MAX_BINS = 320
+NEAREST_M = 0.05  # nothing is in the camera or behind it
 # Costs are -log likelihoods.
 # A joint behind an occluder, for keypoints of score 0 and 1: guesses are often hidden.
 HIDDEN_COST_GUESSED, HIDDEN_COST_SURE = 0.4, 2.5
@@ -127,7 +128,7 @@ def nearest_layer(
 
 
 def _bins(depth_m: Float[np.ndarray, 'n']) -> Float[np.ndarray, 'm']:
-    low, high = float(depth_m.min()) - 0.3, float(depth_m.max()) + 0.6
+    low, high = max(float(depth_m.min()) - 0.3, NEAREST_M), float(depth_m.max()) + 0.6
     count = int(np.clip(np.ceil((high - low) / BIN_M), 2, MAX_BINS))
     return np.linspace(low, high, count)
 

@@ -29,6 +29,7 @@ from pop_core.tracking.finder import FoundBody
 from pop_core.tracking.fresh_fits import FreshFit
 from pop_core.tracking.late_belief import caught_up, moved_on
 from pop_core.tracking.limb_claims import limbs_of, open_shares
+from pop_core.tracking.limb_rest import LimbRests
 from pop_core.tracking.limb_search import LimbSearch
 from pop_core.tracking.limbs import contradicted_joints, limbs_in_the_open, loosened, lost_limbs
 from pop_core.tracking.liveliness import followed_trail, liveliness
@@ -126,6 +127,7 @@ class Follower:
         assert fresh.person.body is not None
         self.begin(track, fresh.person.body)
         track.tries += 1
+        track.limb_rests = LimbRests()
         late_s = (track.now_ns - fresh.stamp_ns) * 1e-9
         for other in track.alternatives:
             other.filter = moved_on(other.filter, self.pipeline.fitter.coarse, late_s, lifted)
@@ -174,6 +176,7 @@ class Follower:
             return fit
         track.tries += 1
         track.filter, track.depth_level = belief, None
+        track.limb_rests = LimbRests()
         track.alternatives.clear()
         return other
 
