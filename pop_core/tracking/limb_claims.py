@@ -26,7 +26,7 @@ from pop_core.rendering.depth_renderer import render_parts
 
 LIMBS = tuple(kind.joints for kind in KINDS)
 TRUNK = len(LIMBS)  # the part of all that is no limb
-ARM_LIMBS = (0, 1)
+ARM_LIMBS, LEG_LIMBS = (0, 1), (2, 3)  # in the order of KINDS
 ENDS = np.array([SHARED_INDEX[JOINT_NAMES[limb[2]]] for limb in LIMBS])  # wrists and ankles
 TRUNK_SIGMA_M = 0.02  # cloth, and the place of what is surer
 RIM_PX = 5  # cloth and hair make a body wider than its model

@@ -11,19 +11,31 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pop_core.body.joints import JOINT_INDEX, N_JOINTS, SHARED_NAMES
+from pop_core.body.joints import N_JOINTS, PARENTS
 from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.limb_points import KINDS
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.tracking.body_filter import FilterState
-from pop_core.tracking.limb_claims import ARM_LIMBS
+from pop_core.tracking.limb_claims import ARM_LIMBS, LEG_LIMBS, LIMBS
 
 STRANGE_M = 0.18  # a keypoint this far from the body, and surely lifted, contradicts it
 SURE_SCORE = 0.55
 SIGMAS = 4.0
 LOOSE_RAD = 0.8
 MOST_OPEN = 0.15  # of a limb: what the camera saw through was not there
-ARM, LEG = ('collar', 'shoulder', 'elbow', 'wrist'), ('hip', 'knee', 'ankle')
-LIMB_OF = {'elbow': ARM, 'wrist': ARM, 'knee': LEG, 'ankle': LEG}
+
+
+def _loose_joints() -> Bool[np.ndarray, '4 24']:
+    """Return which joints of the body turn with each limb: a hand or foot goes along."""
+    out = np.zeros((len(LIMBS), N_JOINTS), dtype=bool)
+    for number, (first, *between, _) in enumerate(LIMBS):
+        out[number, [first, *between]] = True
+        if number in ARM_LIMBS:
+            out[number, PARENTS[first]] = True  # the collar
+    return out
+
+
+LOOSE_JOINTS = _loose_joints()
 
 
 def contradicted_joints(body: BodyState, lifted: LiftedJoints) -> Bool[np.ndarray, 's']:
@@ -35,31 +47,18 @@ def contradicted_joints(body: BodyState, lifted: LiftedJoints) -> Bool[np.ndarra
 
 
 def lost_limbs(contradicted: Bool[np.ndarray, 's']) -> list[Bool[np.ndarray, '24']]:
-    """Return the joints of the arms, and of the legs, that contradicted joints belong to.
+    """Return the joints of the legs, and of the arms, that contradicted joints belong to.
 
     Two of a kind are lost together: they may have been exchanged.
     """
-    found: dict[tuple[str, ...], Bool[np.ndarray, '24']] = {}
-    for row in np.flatnonzero(contradicted):
-        side, _, kind = SHARED_NAMES[row].partition('_')
-        parts = LIMB_OF.get(kind)
-        if parts is not None:
-            bones = found.setdefault(parts, np.zeros(N_JOINTS, dtype=bool))
-            bones[[JOINT_INDEX[f'{side}_{part}'] for part in parts]] = True
-    return list(found.values())
+    lost = [bool(contradicted[list(kind.keypoints)].any()) for kind in KINDS]
+    pairs = [[limb for limb in pair if lost[limb]] for pair in (LEG_LIMBS, ARM_LIMBS)]
+    return [np.asarray(LOOSE_JOINTS[pair].any(axis=0)) for pair in pairs if pair]
 
 
 def limbs_in_the_open(open_share: Float[np.ndarray, '4']) -> list[Bool[np.ndarray, '24']]:
     """Return the joints of each limb that stands where the camera saw through too much of it."""
-    return [_joints_of(number) for number in np.flatnonzero(open_share > MOST_OPEN).tolist()]
-
-
-def _joints_of(limb: int) -> Bool[np.ndarray, '24']:
-    side = 'left' if limb % 2 == 0 else 'right'
-    parts = ARM if limb in ARM_LIMBS else LEG
-    bones = np.zeros(N_JOINTS, dtype=bool)
-    bones[[JOINT_INDEX[f'{side}_{part}'] for part in parts]] = True
-    return bones
+    return list(LOOSE_JOINTS[open_share > MOST_OPEN])
 
 
 def loosened(predicted: FilterState, bones: Bool[np.ndarray, '24']) -> FilterState:

@@ -39,6 +39,14 @@ def seen(body: BodyModel, person: BodyParameters, x_m: float) -> tuple[Detection
     return Detection(lifted.keypoints_px, lifted.scores, np.zeros(4)), lifted
 
 
+def own_pixels(found: tuple[Detection, LiftedJoints]) -> np.ndarray:
+    """Return the mask of somebody who is seen at the keypoints of a detection."""
+    u, v = np.rint(found[0].keypoints_px).astype(int).T
+    out = NOWHERE.copy()
+    out[v, u] = True
+    return out
+
+
 def matches(people: list[Expected], found: list[tuple[Detection, LiftedJoints]]) -> dict[int, int]:
     return associate(people, [d for d, _ in found], [j for _, j in found], GATE_M)
 
@@ -65,9 +73,7 @@ def test_of_two_people_in_one_place_pixels_decide(
     body: BodyModel, person: BodyParameters
 ) -> None:
     found = seen(body, person, 0.0)
-    u, v = np.rint(found[0].keypoints_px).astype(int).T
-    own = NOWHERE.copy()
-    own[v, u] = True
+    own = own_pixels(found)
     people = [expected(body, person, 0.03), expected(body, person, 0.05, mask=own)]
     assert matches(people, [found]) == {1: 0}
 
@@ -98,9 +104,7 @@ def test_who_is_lifted_onto_somebody_nearer_keeps_the_number(
 ) -> None:
     found, lifted = seen(body, person, 0.0)
     nearer = replace(lifted, positions_camera=0.7 * lifted.positions_camera)
-    u, v = np.rint(found.keypoints_px).astype(int).T
-    front = NOWHERE.copy()
-    front[v, u] = True
+    front = own_pixels((found, lifted))
     hidden = expected(body, person, 0.0)
     in_front = Expected(0.7 * expected(body, person, 0.0).points, 0.01, front)
     assert matches([hidden], [(found, nearer)]) == {}
@@ -132,8 +136,6 @@ def test_who_is_seen_on_the_pixels_of_a_person_is_that_person(
     body: BodyModel, person: BodyParameters
 ) -> None:
     found = seen(body, person, 0.5)
-    u, v = np.rint(found[0].keypoints_px).astype(int).T
-    own = NOWHERE.copy()
-    own[v, u] = True
+    own = own_pixels(found)
     assert matches([expected(body, person, 0.0)], [found]) == {}
     assert matches([expected(body, person, 0.0, mask=own)], [found]) == {0: 0}
