@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pop_core.body.joints import SHARED_MIRROR
+from pop_core.body.joints import N_SHARED, SHARED_MIRROR
+
+EVERY_JOINT = np.ones(N_SHARED, dtype=bool)
 
 
 class LiftState(IntEnum):
@@ -59,16 +61,31 @@ class LiftedJoints:
 
     def without_guesses(self) -> LiftedJoints:
         """Return the joints with guessed ones known by their pixel alone."""
-        guessed = self.state == LiftState.GUESSED
-        return LiftedJoints(
-            np.where(guessed[:, None], np.nan, self.positions_camera),
-            np.where(guessed, np.inf, self.sigma_m),
-            np.where(guessed, int(LiftState.OCCLUDED), self.state),
-            self.keypoints_px, self.scores)
+        return self._unlifted(self.state == LiftState.GUESSED, LiftState.OCCLUDED)
 
-    def with_sides_exchanged(self) -> LiftedJoints:
-        """Return the joints with every left one called right, and the other way round."""
+    def without(self, joints: Bool[np.ndarray, 's']) -> LiftedJoints:
+        """Return the joints as if some had not been detected."""
+        return replace(
+            self._unlifted(joints, LiftState.MISSING),
+            keypoints_px=np.where(joints[:, None], np.nan, self.keypoints_px),
+            scores=np.where(joints, 0.0, self.scores))
+
+    def _unlifted(self, joints: Bool[np.ndarray, 's'], state: LiftState) -> LiftedJoints:
+        return replace(
+            self,
+            positions_camera=np.where(joints[:, None], np.nan, self.positions_camera),
+            sigma_m=np.where(joints, np.inf, self.sigma_m),
+            state=np.where(joints, int(state), self.state))
+
+    def with_sides_exchanged(
+        self, joints: Bool[np.ndarray, 's'] = EVERY_JOINT
+    ) -> LiftedJoints:
+        """Return the joints with every left one, or some, called right, and the other way round.
+
+        Args:
+            joints: Which; both of a pair or none.
+        """
+        source = np.where(joints, SHARED_MIRROR, np.arange(N_SHARED))
         return LiftedJoints(
-            self.positions_camera[SHARED_MIRROR], self.sigma_m[SHARED_MIRROR],
-            self.state[SHARED_MIRROR], self.keypoints_px[SHARED_MIRROR],
-            self.scores[SHARED_MIRROR])
+            self.positions_camera[source], self.sigma_m[source], self.state[source],
+            self.keypoints_px[source], self.scores[source])

@@ -41,7 +41,7 @@ from pop_core.tracking.rivals import (
     costs_over,
     follow_alternatives,
 )
-from pop_core.tracking.sides import misnamed_joints, renamed, without_joints
+from pop_core.tracking.sides import misnamed_joints, without_joints
 from pop_core.tracking.track import Alternative, PersonTrack
 from pop_core.tracking.track_view import observe_track
 from pop_core.tracking.tracked_energy import prior_curvature
@@ -104,7 +104,7 @@ class Follower:
         track.blur_m = float(scene.noise.sigma_m(body.joints[:1, 2])[0])
         if lifted is not None:
             track.misnamed = misnamed_joints(body.landmarks, lifted)
-            lifted = renamed(lifted, track.misnamed)
+            lifted = lifted.with_sides_exchanged(track.misnamed)
         observation = observe_track(
             scene.frame, scene.ground, scene.taken, body, track.joint_state, lifted,
             noise=scene.noise)
@@ -245,11 +245,7 @@ class Follower:
         self, found: BodyParameters, fit: WarmFit, observation: Observation,
         lifted: LiftedJoints,
     ) -> bool:
-        """Return whether a limb was found where so much speaks against it that no fit mends it.
-
-        In five recordings that holds for a third of the limbs that would not be taken after
-        their fit, and for a tenth of those that would.
-        """
+        """Return whether a limb was found where so much speaks against it that no fit mends it."""
         bodies = [fit.state, self.pipeline.fitter.coarse.state(found)]
         ours, theirs = costs_over(self.warm.fitter, bodies, observation, fit.segment)
         resolved = max(int(contradicted_joints(fit.state, lifted).sum()), 1)

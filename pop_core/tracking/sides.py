@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 
 from pop_core.body.joints import N_SHARED, SHARED_MIRROR, SHARED_NAMES
 from pop_core.fitting.observation import Observation
-from pop_core.keypoints.lifted_joints import LiftedJoints, LiftState
+from pop_core.keypoints.lifted_joints import LiftedJoints
 
 FAR_M = 0.15  # a joint farther off than this is no worse still
 GAIN = 1.5  # joints' worth of agreement that exchanged sides must bring
@@ -41,25 +41,11 @@ def misnamed_joints(
     return out
 
 
-def renamed(lifted: LiftedJoints, misnamed: Bool[np.ndarray, 's']) -> LiftedJoints:
-    """Return lifted joints with left and right of some exchanged."""
-    source = np.where(misnamed, SHARED_MIRROR, np.arange(N_SHARED))
-    return LiftedJoints(
-        lifted.positions_camera[source], lifted.sigma_m[source], lifted.state[source],
-        lifted.keypoints_px[source], lifted.scores[source])
-
-
 def without_joints(observation: Observation, joints: Bool[np.ndarray, 's']) -> Observation:
     """Return an observation in which some joints were not detected."""
-    lifted, rays = observation.lifted, observation.keypoint_rays
-    missing = LiftedJoints(
-        np.where(joints[:, None], np.nan, lifted.positions_camera),
-        np.where(joints, np.inf, lifted.sigma_m),
-        np.where(joints, int(LiftState.MISSING), lifted.state),
-        np.where(joints[:, None], np.nan, lifted.keypoints_px),
-        np.where(joints, 0.0, lifted.scores))
+    rays = observation.keypoint_rays
     keep = ~joints[rays.joint]
-    return replace(observation, lifted=missing, keypoint_rays=replace(
+    return replace(observation, lifted=observation.lifted.without(joints), keypoint_rays=replace(
         rays, joint=rays.joint[keep], across=rays.across[keep], score=rays.score[keep]))
 
 

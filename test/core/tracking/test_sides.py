@@ -9,7 +9,7 @@ from pop_core.body.joints import SHARED_INDEX, SHARED_NAMES
 from pop_core.body.kinematics import attached_positions
 from pop_core.body.model import BodyModel, BodyParameters, shared_points
 from pop_core.fitting.observation import observe
-from pop_core.tracking.sides import misnamed_joints, renamed, without_joints
+from pop_core.tracking.sides import misnamed_joints, without_joints
 
 HEAD = SHARED_INDEX['head']
 ARMS = np.array([name.endswith(('shoulder', 'elbow', 'wrist')) for name in SHARED_NAMES])
@@ -23,11 +23,11 @@ def test_exchanged_arms_are_found_and_named_right_again(
     body: BodyModel, person: BodyParameters
 ) -> None:
     lifted = lift_truth(body, person)
-    wrong = renamed(lifted, ARMS)
+    wrong = lifted.with_sides_exchanged(ARMS)
     misnamed = misnamed_joints(points(body, person), wrong)
     np.testing.assert_array_equal(misnamed, ARMS)
     np.testing.assert_array_equal(
-        renamed(wrong, misnamed).positions_camera, lifted.positions_camera)
+        wrong.with_sides_exchanged(misnamed).positions_camera, lifted.positions_camera)
 
 
 def test_keypoints_of_the_body_itself_keep_their_sides(
