@@ -6,6 +6,8 @@ does. Depth that was measured farther away than a limb denies it: the camera saw
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Float, Float32, Int
 
@@ -28,6 +30,19 @@ def _bone_costs() -> Float[np.ndarray, 's 5']:
 
 
 BONE_COSTS = _bone_costs()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredBones:
+    """The bones between the keypoints that show a surface, and the depth along them.
+
+    Args:
+        links: The joint that each hangs on, negative for none.
+        depth_m: Depth measured along each limb's bones, as `depths_along_bones` returns it [m].
+    """
+
+    links: Int[np.ndarray, 's']
+    depth_m: Float[np.ndarray, 's n 3']
 
 
 def depths_along_bones(

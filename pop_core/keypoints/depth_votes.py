@@ -162,8 +162,7 @@ def fuse_votes(cells: Cells) -> VotedPerson:
 
     Votes are averaged with weights 1 / sigma^4; those far from the others count less (Huber).
     Errors of neighbouring cells are alike, so that many doubtful votes are worth less than
-    1 / sigma^2 says: with the fourth power 0.30 of the visible joints were right, with the second
-    0.28 (benchmarks/detector, early weights).
+    1 / sigma^2 says.
     """
     weight = cells.probability[:, None] / cells.sigma_m**4
     mean = _weighted_mean(cells.joints, weight)

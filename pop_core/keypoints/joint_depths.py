@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 
 from pop_core.keypoints import lifting_kernels, skeleton_tree_kernels
-from pop_core.keypoints.bone_evidence import BONE_COSTS
+from pop_core.keypoints.bone_evidence import BONE_COSTS, MeasuredBones
 from pop_core.keypoints.depth_layers import DepthLayers
-from pop_core.keypoints.skeleton import LEGS, ORDER, PATH_M, TREE_PARENT, linked
+from pop_core.keypoints.skeleton import LEGS, ORDER, PATH_M, TREE_PARENT
 
 BIN_M = 0.03
 MAX_BINS = 320
@@ -56,6 +56,7 @@ def layer_prices(
     depth_m: Float32[np.ndarray, 'h w'],
     keypoints_px: Float[np.ndarray, 's 2'],
     layers: DepthLayers,
+    links: Int[np.ndarray, 's'],
     jump_ratio: float,
 ) -> Float[np.ndarray, 's l']:
     """Return the cost of lifting each keypoint onto each surface, whatever its depth.
@@ -65,7 +66,6 @@ def layer_prices(
     Arms cross the body far too often for that.
     """
     price = -np.log(np.maximum(layers.share, 1e-6)) + FOREIGN_COST * (1.0 - layers.own_share)
-    links = linked(layers.known)
     gap_m = np.zeros(len(keypoints_px))
     for j in LEGS[links[LEGS] >= 0]:
         (u0, v0), (u1, v1) = keypoints_px[links[j]], keypoints_px[j]
@@ -81,7 +81,7 @@ def choose_depths(
     joints: JointLayers,
     rays: Float[np.ndarray, 's 2'],
     scores: Float[np.ndarray, 's'],
-    along: Float[np.ndarray, 's n 3'],
+    bones: MeasuredBones,
     size: float,
     stretch: float,
 ) -> Float[np.ndarray, 's']:
@@ -91,19 +91,19 @@ def choose_depths(
         joints: Joint depths behind each surface.
         rays: (x/z, y/z) of each keypoint.
         scores: Confidence of each keypoint.
-        along: Depth measured along each limb's bones [m].
+        bones: What hangs on what, and the depth between.
         size: Size of the person relative to the mean default body.
         stretch: Longest bone relative to the mean one of that size.
     """
     present = joints.layers.present
     bins = _bins(joints.depth_m[present])
     usable = joints.layers.known
-    links = linked(usable)
     order = np.array([j for j in ORDER if usable[j]])
     chosen = np.zeros(len(scores), dtype=np.int64)
     skeleton_tree_kernels.tree_depths(
-        _unary(joints, bins, scores), bins, rays, links, order, _limits(links, size, stretch),
-        BONE_TOLERANCE_M, BROKEN_BONE_COST, along, joints.skin_m, BONE_COSTS, chosen)
+        _unary(joints, bins, scores), bins, rays, bones.links, order,
+        _limits(bones.links, size, stretch), BONE_TOLERANCE_M, BROKEN_BONE_COST, bones.depth_m,
+        joints.skin_m, BONE_COSTS, chosen)
     return np.where(usable, bins[chosen], np.nan)
 
 

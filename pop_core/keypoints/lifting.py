@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pop_core.geometry.camera import Camera
-from pop_core.keypoints.bone_evidence import depths_along_bones
+from pop_core.keypoints.bone_evidence import MeasuredBones, depths_along_bones
 from pop_core.keypoints.depth_layers import DepthLayers, find_layers
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.joint_depths import (
@@ -85,15 +85,16 @@ def lift_keypoints(
         frame.depth_m, np.ones(frame.depth_m.shape, bool) if mask is None else mask, pixels,
         config.patch_radius_m * frame.camera.fx, config.layer_gap)
     rays = frame.camera.unproject(pixels, np.ones(len(pixels)))[:, :2]
-    prices = layer_prices(frame.depth_m, pixels, layers, config.layer_gap)
-    along = depths_along_bones(
-        frame.depth_m, pixels, linked(layers.known), frame.camera.fx / layers.middle_m)
+    links = linked(layers.known)
+    prices = layer_prices(frame.depth_m, pixels, layers, links, config.layer_gap)
+    bones = MeasuredBones(links, depths_along_bones(
+        frame.depth_m, pixels, links, frame.camera.fx / layers.middle_m))
     position = np.full((len(pixels), 3), np.nan)
     sigma_m = np.full(len(pixels), np.inf)
     state = np.full(len(pixels), int(LiftState.MISSING))
     if layers.known.any():
         position, sigma_m, state = _lift(
-            _View(frame, pixels, rays, scores, layers, prices, along), config)
+            _View(frame, pixels, rays, scores, layers, prices, bones), config)
     lifted = LiftedJoints(position, sigma_m, state, keypoints_px, scores)
     return _with_given(detection, frame.camera, lifted)
 
@@ -123,7 +124,7 @@ class _View:
     scores: Float[np.ndarray, 's']
     layers: DepthLayers
     prices: Float[np.ndarray, 's l']
-    along: Float[np.ndarray, 's n 3']
+    bones: MeasuredBones
 
 
 def _lift(
@@ -138,7 +139,7 @@ def _lift(
     for _ in range(2):
         joints = _behind_skin(view, scale, facing_share, config)
         depth_m = choose_depths(
-            joints, view.rays, view.scores, view.along, scale, config.stretch)
+            joints, view.rays, view.scores, view.bones, scale, config.stretch)
         chosen = nearest_layer(joints, depth_m)
         state = _states(joints, depth_m, chosen, view.scores)
         at_joint = joints.depth_m[rows, chosen]
