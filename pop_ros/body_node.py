@@ -35,7 +35,7 @@ from pop_ros.tf_messages import tf2_msgs
 POLL_S = 0.05
 FOLLOW_S = 0.25
 REPORT_S = 1.0
-STOP_S = 5.0  # patience at shutdown with the frame in work, and then with the look for people
+STOP_S = 5.0  # patience at shutdown with the frame in work and the look for people
 
 
 class PopNode(LifecycleNode):
@@ -215,4 +215,6 @@ class PopNode(LifecycleNode):
         doing = '' if self._work is None else self._work.doing
         waits = self._work is not None and self._work.is_ready and self._is_wanted()
         _, state = self._state_machine.current_state
-        self._health.report(self.config.diagnostics, state=state, doing=doing, waits=waits)
+        looking_s = 0.0 if self._work is None else self._work.looking_s
+        self._health.report(
+            self.config.diagnostics, state=state, doing=doing, waits=waits, looking_s=looking_s)

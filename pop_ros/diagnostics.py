@@ -36,7 +36,7 @@ class Report:
         state: State of the life cycle.
         doing: What is being prepared; '' when nothing is.
         waits: Whether frames are expected.
-        trouble: What keeps the node from working, or ''.
+        troubles: What keeps the node from working; the first line of each says it.
     """
 
     now: Snapshot
@@ -47,7 +47,7 @@ class Report:
     state: str = 'active'
     doing: str = ''
     waits: bool = True
-    trouble: str = ''
+    troubles: Sequence[str] = ()
 
     @property
     def rate_hz(self) -> float:
@@ -99,8 +99,9 @@ def _judge(report: Report) -> tuple[bytes, str]:
     if faults:
         return DiagnosticStatus.ERROR, (
             f'{faults} frames failed by a fault of the node: {report.now.latest_drop}')
-    if report.trouble:
-        return DiagnosticStatus.WARN, report.trouble.splitlines()[0]
+    if report.troubles:
+        return DiagnosticStatus.WARN, '; '.join(
+            trouble.splitlines()[0] for trouble in report.troubles)
     warnings = list(_warnings(report))
     if warnings:
         return DiagnosticStatus.WARN, '; '.join(warnings)

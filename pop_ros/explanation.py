@@ -1,4 +1,7 @@
-"""Say in words why no RGB-D pair arrives: which topic, at what rate, offered how, stamped when."""
+"""Say in words why nothing comes, of the camera or of the keypoint source.
+
+Of a camera: which topic, at what rate, offered how, stamped when.
+"""
 
 from __future__ import annotations
 
@@ -58,6 +61,12 @@ def explain_missing_pairs(
     """Return why no pair came for some seconds, with what to do about it."""
     lines = [f'no RGB-D frame for {seconds:.0f} s: {_cause(reports, pairer)}']
     return '\n  '.join([*lines, *(report.text() for report in reports)])
+
+
+def explain_missing_keypoints(seconds: float) -> str:
+    """Return what it means that the keypoint source has not answered for some seconds."""
+    return (f'the keypoint source has not answered for {seconds:.0f} s: nobody new is found, and '
+            'who is followed is followed without it; if it goes on, start the node anew')
 
 
 def explain_refused_pairs(pairer: FramePairer[ItemT]) -> str:

@@ -66,6 +66,11 @@ class FrameWork:
         """Return whether frames can be fitted."""
         return self._fitter is not None
 
+    @property
+    def looking_s(self) -> float:
+        """Return for how long an answer of the keypoint source is waited for [s]."""
+        return self._looking.busy_s
+
     def put(self, messages: RgbdMessages) -> None:
         """Have a pair fitted unless a newer one comes first."""
         self._statistics.add_pair()
@@ -104,10 +109,10 @@ class FrameWork:
         self.run(False)
         if self._worker.mailbox.clear():
             self._statistics.add_drop(STOPPED)
+        until_s = time.monotonic() + timeout_s
         finished = self._worker.stop(timeout_s)
         self._finding.stop()
-        # Who waits for an answer in vain shall not wait twice.
-        return self._looking.stop(timeout_s if finished else 0.0) and finished
+        return self._looking.stop(max(until_s - time.monotonic(), 0.0)) and finished
 
     # Worker thread
 

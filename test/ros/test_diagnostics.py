@@ -103,14 +103,14 @@ def test_pairs_with_faults_are_worth_a_warning_and_those_replaced_are_not() -> N
 def test_a_fault_of_the_node_is_an_error_and_comes_first() -> None:
     statistics = fitted()
     statistics.add_refusal('zero division', 'division by zero', is_fault=True)
-    level, text, _ = status(statistics, trouble='no camera\n  more')
+    level, text, _ = status(statistics, troubles=['no camera\n  more'])
     assert level == DiagnosticStatus.ERROR
     assert text == '1 frames failed by a fault of the node: division by zero'
 
 
-def test_trouble_is_told_by_its_first_line() -> None:
-    assert status(fitted(), trouble='no camera\n  more')[:2] == (
-        DiagnosticStatus.WARN, 'no camera')
+def test_troubles_are_told_by_their_first_lines() -> None:
+    assert status(fitted(), troubles=['no camera\n  more', 'no keypoints'])[:2] == (
+        DiagnosticStatus.WARN, 'no camera; no keypoints')
 
 
 @pytest.mark.parametrize(('limits', 'age_ms', 'told'), [

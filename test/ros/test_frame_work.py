@@ -1,6 +1,7 @@
 """A fault of the node itself is counted, told and survived."""
 
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,10 +11,11 @@ from rclpy.lifecycle import LifecycleNode
 from support.camera_cases import PLAIN, build
 from support.messages import camera_info, depth_image, image
 from support.player import Listener
-from support.recording import record
+from support.recording import Recording, record
 
 from pop_core.config import PipelineConfig
-from pop_core.keypoints.detection import Detection
+from pop_core.errors import PopError
+from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.keypoints.openpose_json import OpenPoseJsonDetector
 from pop_core.rgbd import RgbdFrame
 from pop_ros.frame_fitter import FrameFitter
@@ -53,6 +55,25 @@ class Stuck(OpenPoseJsonDetector):
         return super().detect(frame)
 
 
+def prepared(
+    node: LifecycleNode, detector: KeypointDetector
+) -> tuple[FrameWork, NodeStatistics]:
+    """Return the work of a node that always works, and what it counts."""
+    statistics = NodeStatistics()
+    settings = ConfigParameters(node, NodeConfig(lazy=False), PipelineConfig(), lambda: None)
+    work = FrameWork(
+        node, settings, detector, StaticFrames(), NodeOutputs(node), statistics)
+    return work, statistics
+
+
+def messages(recording: Recording, number: int) -> RgbdMessages:
+    """Return a frame of a recording, counted from 1, as its camera sends it."""
+    frame, stamp = recording.scenes[number - 1].frame, recording.stamps[number - 1]
+    return RgbdMessages(
+        image(frame.rgb, 'rgb8', stamp), depth_image(frame.depth_m, '16UC1', stamp),
+        camera_info(frame.camera, stamp), 0.0, number=number)
+
+
 @pytest.fixture
 def node() -> Iterator[LifecycleNode]:
     rclpy.init()
@@ -65,10 +86,8 @@ def node() -> Iterator[LifecycleNode]:
 def test_frames_after_a_fault_are_fitted_and_the_fault_is_counted(
     node: LifecycleNode, capfd: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    statistics, detector = NodeStatistics(), Faulty()
-    settings = ConfigParameters(node, NodeConfig(lazy=False), PipelineConfig(), lambda: None)
-    work = FrameWork(
-        node, settings, detector, StaticFrames(), NodeOutputs(node), statistics)
+    detector = Faulty()
+    work, statistics = prepared(node, detector)
     color, depth, info = build(next(iter(PLAIN)), 0)
     with Listener() as clock:
         assert clock.spin_until(lambda: work.is_ready, 120)
@@ -93,23 +112,17 @@ def test_frames_that_nobody_had_time_for_do_not_make_a_camera_slow(
     node: LifecycleNode, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recording = record(tmp_path, n_frames=6, rate_hz=15.0)
-    statistics, detector = NodeStatistics(), OpenPoseJsonDetector(recording.keypoints)
     told, fit = [], FrameFitter.fit
     monkeypatch.setattr(
         FrameFitter, 'fit',
         lambda *args, skipped, **named: told.append(skipped) or fit(
             *args, skipped=skipped, **named))
-    settings = ConfigParameters(node, NodeConfig(lazy=False), PipelineConfig(), lambda: None)
-    work = FrameWork(
-        node, settings, detector, StaticFrames(), NodeOutputs(node), statistics)
+    work, statistics = prepared(node, OpenPoseJsonDetector(recording.keypoints))
     with Listener() as clock:
         assert clock.spin_until(lambda: work.is_ready, 120)
         work.run(True)
         for number in (1, 2, 3, 6):
-            frame, stamp = recording.scenes[number - 1].frame, recording.stamps[number - 1]
-            work.put(RgbdMessages(
-                image(frame.rgb, 'rgb8', stamp), depth_image(frame.depth_m, '16UC1', stamp),
-                camera_info(frame.camera, stamp), 0.0, number=number))
+            work.put(messages(recording, number))
             assert clock.spin_until(lambda: statistics.snapshot().pending == 0, 20)
     assert work.stop(10)
     assert statistics.snapshot().frames == 4
@@ -121,22 +134,41 @@ def test_people_are_followed_while_the_keypoint_source_thinks(
     node: LifecycleNode, tmp_path: Path
 ) -> None:
     recording = record(tmp_path, n_frames=12, rate_hz=15.0)
-    statistics, detector = NodeStatistics(), Stuck(recording.keypoints, answers=2)
-    settings = ConfigParameters(node, NodeConfig(lazy=False), PipelineConfig(), lambda: None)
-    work = FrameWork(
-        node, settings, detector, StaticFrames(), NodeOutputs(node), statistics)
+    detector = Stuck(recording.keypoints, answers=2)
+    work, statistics = prepared(node, detector)
     with Listener() as clock:
         assert clock.spin_until(lambda: work.is_ready, 120)
         work.run(True)
-        for number, (scene, stamp) in enumerate(
-                zip(recording.scenes, recording.stamps, strict=True), start=1):
-            frame = scene.frame
-            work.put(RgbdMessages(
-                image(frame.rgb, 'rgb8', stamp), depth_image(frame.depth_m, '16UC1', stamp),
-                camera_info(frame.camera, stamp), 0.0, number=number))
+        for number in range(1, 13):
+            work.put(messages(recording, number))
             assert clock.spin_until(lambda: statistics.snapshot().pending == 0, 20)
         assert detector.left < 0  # it was asked, and has not answered
         assert statistics.snapshot().frames == 12
+        assert work.looking_s > 0.0
         detector.go_on.set()
         assert work.stop(20)
     assert statistics.snapshot().refused == 0
+
+
+def test_at_the_end_frame_and_look_share_one_patience(
+    node: LifecycleNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go_on, asked = threading.Event(), threading.Event()
+
+    def slow(fitter: FrameFitter, *_: object, **__: object) -> None:
+        fitter._looking.submit(go_on.wait)
+        asked.set()
+        time.sleep(0.7)
+        raise PopError('in vain')
+
+    monkeypatch.setattr(FrameFitter, 'fit', slow)
+    work, _ = prepared(node, Faulty())
+    with Listener() as clock:
+        assert clock.spin_until(lambda: work.is_ready, 120)
+        work.run(True)
+        work.put(RgbdMessages(*build(next(iter(PLAIN)), 0), 0.0))
+        assert asked.wait(20)
+    began_s = time.monotonic()
+    assert not work.stop(1.0)
+    assert time.monotonic() - began_s < 1.4  # and not 0.7 s and another second
+    go_on.set()

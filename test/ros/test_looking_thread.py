@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import threading
+import time
 from concurrent.futures import wait
 
 import pytest
@@ -45,10 +46,22 @@ def test_a_stopped_thread_ends_once_its_work_is_done() -> None:
 
 def test_a_thread_that_still_thinks_is_said_to() -> None:
     looking, go_on = LookingThread(), threading.Event()
+    assert looking.busy_s == 0.0
     answer = looking.submit(go_on.wait)
     assert not looking.stop(0.01)
+    before_s = looking.busy_s
+    assert 0.01 <= before_s < looking.busy_s
     go_on.set()
     assert answer.result(WAIT_S)
+    assert looking.stop(WAIT_S)
+    assert looking.busy_s == 0.0
+
+
+def test_the_time_of_a_look_does_not_count_for_the_next() -> None:
+    looking = LookingThread()
+    looking.submit(lambda: time.sleep(0.2))
+    assert looking.submit(lambda: looking.busy_s).result(WAIT_S) < 0.2
+    assert looking.stop(WAIT_S)
 
 
 def test_a_source_that_never_answers_keeps_no_program_alive() -> None:
