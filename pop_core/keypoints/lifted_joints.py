@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 
 from pop_core.body.joints import N_SHARED, SHARED_MIRROR
 
+SURE_SCORE = 0.55
 EVERY_JOINT = np.ones(N_SHARED, dtype=bool)
 
 
@@ -58,6 +59,11 @@ class LiftedJoints:
     def lifted(self) -> Bool[np.ndarray, 's']:
         """Return which joints have a position."""
         return np.isfinite(self.positions_camera).all(axis=1)
+
+    @property
+    def sure(self) -> Bool[np.ndarray, 's']:
+        """Return which joints were lifted from keypoints that the detector is sure of."""
+        return self.lifted & (self.scores >= SURE_SCORE)
 
     def without_guesses(self) -> LiftedJoints:
         """Return the joints with guessed ones known by their pixel alone."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pop_core.body.joints import SHARED
 from pop_core.estimate import JointState, TrackState
+from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.tracking.detection_schedule import Gap
 from pop_core.tracking.fresh_fits import FreshFit
 from pop_core.tracking.track import PersonTrack
@@ -13,7 +14,7 @@ MOST_DOUBTS, RESTART_EVERY_S = 2, 1.0
 # A body that no look has agreed with yet is looked for anew soon, then ever more rarely [s].
 FIRST_WAIT_S, LONGEST_WAIT_S = 0.05, 1.6
 MOST_MISSES = 3
-CREDIBLE_SCORE = 0.3  # of a body that may be somebody who was lost
+CREDIBLE_SCORE = 0.5  # of a body that somebody is taken to be who was expected elsewhere
 CLEARLY_SEEN = 8  # shared joints that a body claims the camera sees: a detector would find it
 SETTLED_S = 0.5  # after a body was found
 
@@ -36,13 +37,27 @@ def is_doubtful(track: PersonTrack, gap: Gap) -> bool:
     return track.doubts >= MOST_DOUBTS and _restarted_ago_s(track) > RESTART_EVERY_S
 
 
-def may_be(track: PersonTrack, fresh: FreshFit) -> bool:
-    """Return whether a body found anew may be a person: of who was not seen it must explain much.
+def has_outgrown_evidence(track: PersonTrack, lifted: LiftedJoints) -> bool:
+    """Return whether most joints that are seen now were not yet when the body was looked for.
 
-    Of somebody who comes out from behind a wall the first keypoints lie on the wall.
+    Of who came out from behind a wall with a leg first, trunk and head are a guess that the
+    first keypoints agree with.
+    """
+    known = track.evidence[lifted.sure]
+    return bool(known.size and known.mean() < 0.5)
+
+
+def may_be(track: PersonTrack, fresh: FreshFit) -> bool:
+    """Return whether a body that was found elsewhere may be a person, and not what hides them.
+
+    Of somebody who passes behind a wall the first or last keypoints lie on the wall; of somebody
+    behind another person, on that person.
     """
     found = fresh.person.estimate
-    return not is_stale(track) or (found is not None and found.score >= CREDIBLE_SCORE)
+    if found is None or found.score < CREDIBLE_SCORE:
+        return False
+    # Who was not seen for a while may be at another distance, where depth errs otherwise.
+    return is_stale(track) or not track.is_unusual(found.energies['E_depth'])
 
 
 def is_settled(track: PersonTrack) -> bool:

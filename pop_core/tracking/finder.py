@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from pop_core.body.model import BodyParameters
 from pop_core.estimate import BodyEstimate, EstimateStatus
@@ -71,11 +71,13 @@ class FoundBody:
         parameters: The fit.
         hessian: J'WJ of the fit.
         runners_up: Other explanations.
+        evidence: Shared joints that were surely seen.
     """
 
     parameters: BodyParameters
     hessian: Float[np.ndarray, 'x x']
     runners_up: tuple[BodyParameters, ...]
+    evidence: Bool[np.ndarray, 's']
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,4 +108,4 @@ def find_person(pipeline: BodyPipeline, scene: Scene, detection: Detection) -> F
     fit = person.fit
     return FoundPerson(
         person.status, person.estimate,
-        FoundBody(fit.parameters, fit.hessian, fit.runners_up))
+        FoundBody(fit.parameters, fit.hessian, fit.runners_up, lifted.sure))

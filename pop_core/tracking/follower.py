@@ -51,7 +51,6 @@ from pop_core.tracking.warm_start import SeenBody, WarmFit, WarmStart, sighting,
 MIN_SEEN = 0.04  # share of the body that must be seen for the frame to say anything of it
 CONTRADICTED = 0.4  # a body is not where the camera saw through this share of it
 USUAL_SHARE = 0.05  # how fast the usual E_depth follows
-UNUSUAL, UNUSUAL_M = 1.5, 0.01  # E_depth above this many times the usual and this much more
 TRUSTED_SUPPORT = 0.5
 # Standard deviations are wider than the filter's own by this: frames err together, and a limb may
 # be taken for another (`python -m benchmarks tracking`, coverage rows).
@@ -142,7 +141,7 @@ class Follower:
 
     def begin(self, track: PersonTrack, found: FoundBody) -> None:
         """Keep the other explanations of a fresh fit while they may be true."""
-        track.restarted_ns = track.now_ns
+        track.restarted_ns, track.evidence = track.now_ns, found.evidence
         track.doubts, track.is_doubtful = 0, False
         track.alternatives = [
             Alternative(first_state(other, found.hessian), 0.0, track.now_ns)
@@ -167,6 +166,8 @@ class Follower:
     ) -> WarmFit:
         """Return the better of what was followed and what was found anew."""
         track.restarted_ns, track.doubts = track.now_ns, 0
+        assert rival.person.body is not None
+        track.evidence = track.evidence | rival.person.body.evidence
         belief = self._found_anew(track, rival, observation.lifted)
         other = self.warm.fit(belief, observation, self.config.steps, detected=True)
         ours, theirs = costs(self.warm.fitter, [fit, other], observation)
@@ -284,9 +285,9 @@ class Follower:
     ) -> None:
         """Note whether a fit is worse than it used to be, or against its keypoints."""
         depth_m = fit.energies['E_depth']
-        usual_m = depth_m if track.depth_level is None else track.depth_level
-        unusual = depth_m > UNUSUAL * usual_m + UNUSUAL_M
+        unusual = track.is_unusual(depth_m)
         if not unusual:
+            usual_m = depth_m if track.depth_level is None else track.depth_level
             track.depth_level = (1.0 - USUAL_SHARE) * usual_m + USUAL_SHARE * depth_m
         track.is_doubtful = unusual or support < TRUSTED_SUPPORT
         if lifted is not None:

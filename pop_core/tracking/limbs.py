@@ -19,7 +19,6 @@ from pop_core.tracking.body_filter import FilterState
 from pop_core.tracking.limb_claims import ARM_LIMBS, LEG_LIMBS, LIMBS
 
 STRANGE_M = 0.18  # a keypoint this far from the body, and surely lifted, contradicts it
-SURE_SCORE = 0.55
 SIGMAS = 4.0
 LOOSE_RAD = 0.8
 MOST_OPEN = 0.15  # of a limb: what the camera saw through was not there
@@ -43,7 +42,7 @@ def contradicted_joints(body: BodyState, lifted: LiftedJoints) -> Bool[np.ndarra
     offset = np.linalg.norm(body.landmarks - lifted.positions_camera, axis=1)
     with np.errstate(invalid='ignore'):
         far = offset > np.maximum(STRANGE_M, SIGMAS * lifted.sigma_m)
-    return lifted.lifted & far & (lifted.scores >= SURE_SCORE)
+    return lifted.sure & far
 
 
 def lost_limbs(contradicted: Bool[np.ndarray, 's']) -> list[Bool[np.ndarray, '24']]:

@@ -14,6 +14,8 @@ from pop_core.tracking.body_filter import FilterState
 from pop_core.tracking.limb_rest import LimbRests
 from pop_core.tracking.tracking_config import TrackingConfig
 
+UNUSUAL, UNUSUAL_M = 1.5, 0.01  # E_depth above this many times the usual and this much more
+
 
 def _no_joints() -> Bool[np.ndarray, '15']:
     return np.zeros(N_SHARED, dtype=bool)
@@ -59,6 +61,7 @@ class PersonTrack:
         is_proven: Whether a look after the first one has agreed with the body.
         tries: Bodies that were taken over since a look last agreed with one.
         restarted_ns: When the body was last looked for anew.
+        evidence: Shared joints that were surely seen when it was.
         trail: Where the joints were of late, None before the second frame [m].
         left_m: How far any joint has left it.
         blur_m: Noise of the depth image where the person is.
@@ -88,6 +91,7 @@ class PersonTrack:
     is_proven: bool = False
     tries: int = 1
     restarted_ns: int = 0
+    evidence: Bool[np.ndarray, '15'] = field(default_factory=_no_joints)
     trail: Float[np.ndarray, '24 3'] | None = None
     left_m: float = 0.0
     blur_m: float = 0.0
@@ -110,6 +114,11 @@ class PersonTrack:
     def is_shown(self) -> bool:
         """Return whether the person is given out."""
         return self.state is not TrackState.LOST
+
+    def is_unusual(self, depth_m: float) -> bool:
+        """Return whether an E_depth [m] is far above what is usual for this person."""
+        usual_m = self.depth_level
+        return usual_m is not None and depth_m > UNUSUAL * usual_m + UNUSUAL_M
 
     def note_seen(self, estimate: BodyEstimate, config: TrackingConfig) -> None:
         """Take over a frame that shows the person."""

@@ -22,6 +22,7 @@ from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, 
 from pop_core.tracking.doubts import (
     STALE_S,
     count_misses,
+    has_outgrown_evidence,
     is_doubtful,
     is_settled,
     is_stale,
@@ -204,8 +205,10 @@ class BodyTracker:
             lifted = glimpse.joints(self._finder, scene.taken, track.id, expected)
             astray = glimpse.offset_m(track.id, expected) > self.config.gate_m
             elsewhere = elsewhere or astray
+            is_open = elsewhere or is_doubtful(track, self._gap) or (
+                has_outgrown_evidence(track, lifted))
             late_s = self._late_s(track)
-            if fresh is None and late_s == 0.0 and (elsewhere or is_doubtful(track, self._gap)):
+            if fresh is None and late_s == 0.0 and is_open:
                 with watch.step('restart'):
                     self._ask(scene, glimpse, track.id)
                 fresh = self._fresh.take(track.id)
@@ -214,7 +217,7 @@ class BodyTracker:
             if late_s > 0.0:
                 self._follower.catch_up(track, lifted, late_s)
         rival = fresh if fresh is not None and fresh.person.body is not None else None
-        if rival is not None and not may_be(track, rival):
+        if rival is not None and elsewhere and not may_be(track, rival):
             rival = lifted = None
         if rival is not None and elsewhere:
             self._follower.restart(track, rival, lifted)

@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.one_person import facing_person
+from support.one_person import facing_person, lift_truth
 from support.stage import RATE_HZ, Stage, only
 
+from pop_core.body.joints import SHARED_INDEX
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.estimate import EstimateStatus, JointState, TrackState
 from pop_core.tracking.detection_schedule import DetectionSchedule, Gap
-from pop_core.tracking.doubts import count_misses, is_doubtful, may_be
+from pop_core.tracking.doubts import count_misses, has_outgrown_evidence, is_doubtful, may_be
 from pop_core.tracking.finder import FoundPerson
 from pop_core.tracking.fresh_fits import FreshFit
 from pop_core.tracking.track import PersonTrack
@@ -67,17 +68,47 @@ def test_looks_prove_a_body(followed: Stage, track: PersonTrack) -> None:
     assert track.has_ended(TrackingConfig())
 
 
-def test_of_who_was_lost_a_body_found_anew_must_explain_much(
-    body: BodyModel, followed: Stage, person: BodyParameters, track: PersonTrack
+def test_who_is_found_elsewhere_must_explain_keypoints_and_depth_as_usual(
+    followed: Stage, person: BodyParameters, track: PersonTrack
 ) -> None:
     seen = only(followed.show(person))
-    good, poor = (
-        FreshFit(FoundPerson(EstimateStatus.OK, replace(seen, score=score)), 0)
-        for score in (0.9, 0.1))
-    assert may_be(track, poor)
+    track.depth_level = seen.energies['E_depth']
+    strange = seen.energies | {'E_depth': 2.0 * track.depth_level + 0.02}
+    good, poor, astray = (
+        FreshFit(FoundPerson(EstimateStatus.OK, body), 0)
+        for body in (replace(seen, score=0.9), replace(seen, score=0.1),
+                     replace(seen, score=0.9, energies=strange)))
+    assert [may_be(track, fresh) for fresh in (good, poor, astray)] == [True, False, False]
+    # Of who was lost for a while nobody knows how well depth agrees where they come out.
     track.seen_ns = track.now_ns - 10 * FRAME_NS
-    assert may_be(track, good)
-    assert not may_be(track, poor)
+    assert [may_be(track, fresh) for fresh in (good, poor, astray)] == [True, False, True]
+
+
+def test_evidence_is_outgrown_once_most_of_what_is_seen_is_new(
+    body: BodyModel, person: BodyParameters, track: PersonTrack
+) -> None:
+    assert not has_outgrown_evidence(track, lift_truth(body, person))
+    track.evidence = np.arange(15) < 7
+    lifted = lift_truth(body, person)
+    assert has_outgrown_evidence(track, lifted)
+    assert not has_outgrown_evidence(track, lift_truth(body, person, hidden=(14,)))
+    guesses = np.where(np.arange(15) < 7, lifted.scores, 0.3)
+    assert not has_outgrown_evidence(track, replace(lifted, scores=guesses))
+    assert not has_outgrown_evidence(track, lifted.without(np.ones(15, dtype=bool)))
+
+
+def test_a_body_that_began_with_a_leg_is_looked_for_anew_once_when_the_rest_comes_out(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    stage = Stage(body)
+    only(stage.show(person, times=2))
+    fits = stage.count_fits()
+    track = stage.tracker._tracks[0]
+    track.evidence[:] = False
+    track.evidence[[SHARED_INDEX['left_knee'], SHARED_INDEX['left_ankle']]] = True
+    only(stage.show(person, times=8))
+    assert len(fits) == 1
+    assert track.evidence.all()
 
 
 def test_a_joint_that_comes_out_is_looked_at_in_the_next_frame(track: PersonTrack) -> None:
