@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 
 from pop_core.depth_noise import DepthNoise, estimate_depth_noise
 from pop_core.keypoints.detection import Detection
@@ -39,8 +39,8 @@ class Look:
         ground: The floor, if one is seen.
         noise: Noise of the measured depth.
         times_ms: Wall time per step [ms].
-        places: Shared points of those who were known in that frame, by the number of their
-            track [m]; of none when it is the present one.
+        places: Where those were who were known in that frame, by the number of their track; of
+            none when it is the present one.
     """
 
     frame: RgbdFrame
@@ -48,16 +48,28 @@ class Look:
     ground: Ground | None
     noise: DepthNoise
     times_ms: Mapping[str, float]
-    places: Mapping[int, Float[np.ndarray, 's 3']] = field(default_factory=dict)
+    places: Mapping[int, Expected] = field(default_factory=dict)
 
-    def scene(self, taken: Bool[np.ndarray, 'h w']) -> Scene:
-        """Return its frame, with the pixels that nearer people explain."""
+    def scene(self, taken: Bool[np.ndarray, 'h w'], track: int | None = None) -> Scene:
+        """Return its frame, with the pixels that nearer people explain.
+
+        Args:
+            taken: Those pixels in the present frame: where people were, they are no more.
+            track: Whose frame it is to be; None for somebody new, who is behind everybody.
+        """
+        place = None if track is None else self.places.get(track)
+        if place is not None:
+            taken = np.zeros_like(taken) if place.cover is None else place.cover
+        elif self.places:
+            taken = np.any([other.mask for other in self.places.values()], axis=0)
         return Scene(self.frame, self.ground, self.noise, taken)
 
     def then(self, track: int, expected: Expected) -> Expected:
         """Return where a person was in this frame, who should be somewhere by now."""
         place = self.places.get(track)
-        return expected if place is None else replace(expected, points=place)
+        if place is None:
+            return expected
+        return replace(expected, points=place.points, mask=place.mask, cover=place.cover)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,16 +100,16 @@ class Glimpse:
 
         Args:
             finder: Lifts them anew where somebody nearer may have been in the way.
-            taken: Pixels that nearer people explain.
+            taken: Pixels that nearer people explain in the present frame.
             track: Number of the track that they belong to.
             expected: Where the person should be by now.
         """
         look = self.look
-        lifted = finder.lifted_behind(look.scene(taken), look.found, self.index)
+        lifted = finder.lifted_behind(look.scene(taken, track), look.found, self.index)
         place = look.places.get(track)
         if place is None:
             return lifted
-        return carried(lifted, place, expected.points, look.frame.camera)
+        return carried(lifted, place.points, expected.points, look.frame.camera)
 
 
 def look_for_people(pipeline: BodyPipeline, frame: RgbdFrame, seen: RgbdFrame) -> Look:
@@ -139,7 +151,7 @@ class Looks:
         """Have looks made meanwhile; None makes each while it is waited for."""
         self._lookout = lookout
         self._made: Future[Look] | None = None
-        self._places: dict[int, Float[np.ndarray, 's 3']] | None = None
+        self._places: dict[int, Expected] | None = None
 
     @property
     def is_busy(self) -> bool:
@@ -176,7 +188,7 @@ class Looks:
         self._made = made
         return None
 
-    def remember(self, places: Callable[[], dict[int, Float[np.ndarray, 's 3']]]) -> None:
+    def remember(self, places: Callable[[], dict[int, Expected]]) -> None:
         """End a frame: keep where people were if it is the one that is looked at."""
         if self._made is not None and self._places is None:
             self._places = places()

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
 from threadpoolctl import ThreadpoolController
 
 from pop_core.depth_noise import USUAL_NOISE
@@ -140,8 +139,9 @@ class BodyTracker:
             self._ground, self._noise = look.ground, look.noise
         return look
 
-    def _places(self) -> dict[int, Float[np.ndarray, 's 3']]:
-        return {track.id: self._follower.expected(track).points for track in self._tracks}
+    def _places(self) -> dict[int, Expected]:
+        places = behind_others([self._follower.expected(track) for track in self._tracks])
+        return {track.id: place for track, place in zip(self._tracks, places, strict=True)}
 
     def _track(
         self, frame: RgbdFrame, look: Look | None, watch: Stopwatch
@@ -234,7 +234,7 @@ class BodyTracker:
     def _ask(self, scene: Scene, glimpse: Glimpse, number: int | None = None) -> None:
         """Have a detected person fitted from retrieved poses; wait where nobody is known."""
         self._fresh.ask(
-            self.pipeline, glimpse.look.scene(scene.taken), glimpse.detection, number,
+            self.pipeline, glimpse.look.scene(scene.taken, number), glimpse.detection, number,
             wait=self._gap.is_of_slow_camera or not self._tracks)
 
     def _begin(

@@ -15,10 +15,11 @@ from pop_core.depth_noise import USUAL_NOISE
 from pop_core.errors import PopError
 from pop_core.geometry.camera import Camera
 from pop_core.rgbd import RgbdFrame
+from pop_core.tracking.association import Expected
 from pop_core.tracking.detection_schedule import DetectionSchedule, Gap
-from pop_core.tracking.finder import Found
+from pop_core.tracking.finder import Finder, Found
 from pop_core.tracking.late_belief import carried
-from pop_core.tracking.looks import Look, Looks
+from pop_core.tracking.looks import Glimpse, Look, Looks
 from pop_core.tracking.tracking_config import TrackingConfig
 
 STEP_M = 0.03  # a slow walk at the stage's rate
@@ -173,6 +174,35 @@ def test_no_look_is_due_while_one_is_made() -> None:
     assert not schedule.has_looked
     assert schedule.is_due([], quick)
     assert schedule.has_looked
+
+
+def test_of_who_stood_behind_others_nothing_is_lifted_onto_where_they_were_then(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    nearer = person.replaced(transl=person.transl - [0.15, 0.0, 0.8])
+    stage = Stage(body)
+    frame = stage.frame(nearer, person, hidden=False)
+    own = stage.frame(nearer, hidden=False).depth_m == frame.depth_m
+    front = own & (frame.depth_m < person.transl[2] - 0.5)
+    detection = stage.source.detection(frame, person)
+    finder = Finder(stage.tracker.pipeline)
+    found = finder.lift(frame, [detection])
+    points = attached_positions(shared_points(body), body, person)
+    behind = Expected(points, 0.01, ~front, front)
+    old = replace(a_look(), frame=frame, found=found, places={
+        0: Expected(points - [0.0, 0.0, 0.8], 0.01, front), 1: behind})
+    gone_on = np.roll(front, 40, axis=1)
+
+    def strangers(look: Look) -> int:
+        lifted = Glimpse(look, 0).joints(finder, gone_on, 1, behind)
+        return int((lifted.positions_camera[lifted.lifted, 2] < points[:, 2].min() - 0.3).sum())
+
+    assert strangers(replace(old, places={})) > 0  # with the pixels of the present frame
+    assert strangers(old) == 0
+    np.testing.assert_array_equal(old.scene(gone_on, 1).taken, front)
+    np.testing.assert_array_equal(old.scene(gone_on).taken, np.ones_like(front))
+    assert not old.scene(gone_on, 0).taken.any()
+    np.testing.assert_array_equal(replace(old, places={}).scene(gone_on).taken, gone_on)
 
 
 def test_carried_joints_keep_their_errors_and_their_pixels_follow(
