@@ -20,7 +20,7 @@ SIZE_WORTH_M = 0.6  # per unit of log size
 SIZE_SIGMA = 0.12  # two lifted skeletons of one person differ by this [log size]
 FEWEST_BONES = 3
 COVERED_WORTH_M = 0.1  # a joint that is known across its ray only is as good as this far off
-OWN_OVERLAP = 0.5  # share of the keypoints on a person's pixels that tells it is them
+OWN_OVERLAP = 0.5  # share of keypoints without depth on a person's pixels: it is them
 NO_MATCH = 1e6
 BONE_ENDS = np.array([(SHARED_INDEX[a], SHARED_INDEX[b]) for a, b, _ in BONES])
 
@@ -98,7 +98,7 @@ def matching_cost(
         return NO_MATCH if overlap < OWN_OVERLAP else MASK_WORTH_M * (2.0 - overlap)
     distance = offset_m(person, lifted)
     # Who is seen where somebody is, is hardly somebody else.
-    if distance > reach_m(person, gate_m) * (2.0 if overlap > OWN_OVERLAP else 1.0):
+    if distance - MASK_WORTH_M * overlap > reach_m(person, gate_m):
         return NO_MATCH
     size = log_size(lifted, person.points)
     strange = max(0.0, abs(size) - SIZE_SIGMA)

@@ -132,10 +132,13 @@ def test_who_is_seen_the_other_way_round_is_the_same_person(
         [expected(body, person, 0.0)], [(found, lifted.with_sides_exchanged())]) == {0: 0}
 
 
-def test_who_is_seen_on_the_pixels_of_a_person_is_that_person(
-    body: BodyModel, person: BodyParameters
+@pytest.mark.parametrize(('x_m', 'as_stranger', 'on_own_pixels'), [
+    (0.32, {0: 0}, {0: 0}), (0.45, {}, {0: 0}), (0.55, {}, {})])
+def test_who_is_seen_on_the_pixels_of_a_person_is_matched_from_farther_off(
+    body: BodyModel, person: BodyParameters, x_m: float, as_stranger: dict[int, int],
+    on_own_pixels: dict[int, int],
 ) -> None:
-    found = seen(body, person, 0.5)
+    found = seen(body, person, x_m)
+    assert matches([expected(body, person, 0.0)], [found]) == as_stranger
     own = own_pixels(found)
-    assert matches([expected(body, person, 0.0)], [found]) == {}
-    assert matches([expected(body, person, 0.0, mask=own)], [found]) == {0: 0}
+    assert matches([expected(body, person, 0.0, mask=own)], [found]) == on_own_pixels
