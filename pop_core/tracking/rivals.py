@@ -35,7 +35,12 @@ def costs_over(
     fitter: BodyFitter, bodies: Sequence[BodyState], observation: Observation,
     segment: Bool[np.ndarray, 'h w'],
 ) -> list[float]:
-    """Return the cost of each body by E_depth over some pixels, keypoints and priors."""
+    """Return the cost of each body by E_depth over some pixels, keypoints and priors.
+
+    The pose prior weighs as in a single frame, less than where people are followed: there it holds
+    what is not seen over many frames, here it would speak against rare poses that are. Decisions
+    are as good with either (`python -m benchmarks tracking`).
+    """
     hypotheses = [
         Hypothesis(body, PriorBelief(fitter.prior, body.parameters.body_pose, np.ones(23)))
         for body in bodies]
