@@ -15,10 +15,11 @@ from pop_core.depth_noise import DepthNoise, estimate_depth_noise
 from pop_core.estimate import BodyEstimate, EstimateStatus, FrameResult
 from pop_core.fitting.body_fit import BodyFit, BodyFitter
 from pop_core.fitting.body_window import body_window
+from pop_core.fitting.calibration import SINGLE_FRAME
 from pop_core.fitting.joint_state import fitted_joint_states
 from pop_core.fitting.observation import Observation, observe
 from pop_core.fitting.plausibility import plausibility
-from pop_core.fitting.uncertainty import joint_covariance
+from pop_core.fitting.uncertainty import Calibration, joint_covariance
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.keypoints.lifted_joints import LiftedJoints
@@ -215,7 +216,8 @@ class BodyPipeline:
             camera=camera)
 
     def estimate(
-        self, scene: Scene, fit: BodyFit, trust: float
+        self, scene: Scene, fit: BodyFit, trust: float,
+        calibration: Calibration = SINGLE_FRAME,
     ) -> tuple[BodyEstimate, float]:
         """Return the result of a fit at the frame's full resolution, and its depth support.
 
@@ -223,6 +225,7 @@ class BodyPipeline:
             scene: The frame.
             fit: The body.
             trust: Share 0..1 that multiplies the support to the score.
+            calibration: How wide covariances are, given what speaks against such a fit.
         """
         parameters, body = fit.parameters, self.fitter.full
         mesh = body.skinning.vertices(parameters, fit.coarse.skeleton)
@@ -240,8 +243,7 @@ class BodyPipeline:
         joints = fit.coarse.joints
         state = fitted_joint_states(self.model, joints, rendered, depth_m, camera)
         support = depth_support(depth_m, rendered, own)
-        covariance = joint_covariance(
-            self.model, parameters, fit.hessian, fit.runners_up, state, support)
+        covariance = joint_covariance(self.model, fit, state, calibration)
         estimate = BodyEstimate(
             parameters=parameters, vertices=mesh, joints=joints,
             joint_rotations=fit.coarse.skeleton.G, joint_state=state,

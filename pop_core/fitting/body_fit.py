@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.fitting.body_state import BodyState, FitBody
 from pop_core.fitting.depth_consistency import Visibility, depth_energy, see_body
+from pop_core.fitting.disagreement import Disagreement, disagreement, unnamed_joints
 from pop_core.fitting.energy import PAIR_BLOCKS, PRIOR_BLOCKS, BodyEnergy, PriorBelief
 from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.fitting.hypotheses import WIDEST_M, Hypothesis, HypothesisSteps
@@ -45,6 +46,7 @@ class BodyFit:
         segment: Pixels of the observation that show the person.
         energies: Final energies by name.
         runners_up: The other finalists, best first.
+        disagreement: What other hypotheses and keypoints say against the winner.
         sides_exchanged: Whether the keypoints' left turned out to be right.
     """
 
@@ -55,6 +57,7 @@ class BodyFit:
     segment: Bool[np.ndarray, 'h w']
     energies: dict[str, float]
     runners_up: tuple[BodyParameters, ...]
+    disagreement: Disagreement
     sides_exchanged: bool = False
 
 
@@ -108,8 +111,14 @@ class BodyFitter:
         named = observation
         if self.config.other_readings:
             winner, named = best_facing(winner, observation, self.steps, TURNED_SCHEDULE)
-        body = self._finish(self._polished(winner, named), others, named)
-        return replace(body, sides_exchanged=named is not observation)
+        excess = [other.cost - winner.cost for other in others]
+        body = self._polished(winner, named)
+        left = disagreement(
+            body.state, [other.state for other in others], excess,
+            [hypothesis.state for hypothesis in started],
+            unnamed_joints(body.state, named.lifted))
+        fit = self._finish(body, others, named, left)
+        return replace(fit, sides_exchanged=named is not observation)
 
     def _start(self, candidate: PoseCandidate, all_of_them: Sequence[PoseCandidate]) -> Hypothesis:
         parameters = initial_parameters(self.model, candidate)
@@ -151,7 +160,8 @@ class BodyFitter:
         return hypothesis
 
     def _finish(
-        self, winner: Hypothesis, others: Sequence[Hypothesis], observation: Observation
+        self, winner: Hypothesis, others: Sequence[Hypothesis], observation: Observation,
+        left: Disagreement,
     ) -> BodyFit:
         """Return the winner with its energies and the curvature of its cost."""
         coarse = self.coarse.state(winner.state.parameters)
@@ -168,7 +178,7 @@ class BodyFitter:
         }
         return BodyFit(
             coarse.parameters, assemble(blocks, self.coarse.size).hessian, visibility, coarse,
-            segment, energies, tuple(other.state.parameters for other in others))
+            segment, energies, tuple(other.state.parameters for other in others), left)
 
 
 def _best(hypotheses: Sequence[Hypothesis], count: int) -> list[Hypothesis]:

@@ -11,9 +11,9 @@ from pop_core.body.model import BodyParameters
 from pop_core.estimate import BodyEstimate
 from pop_core.fitting.body_fit import BodyFit
 from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.disagreement import disagreement, unnamed_joints
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.plausibility import plausibility
-from pop_core.fitting.uncertainty import joint_covariance
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.pipeline import BodyPipeline, Scene
 from pop_core.tracking.association import Expected
@@ -25,6 +25,7 @@ from pop_core.tracking.body_filter import (
     predict,
     with_known_shape,
 )
+from pop_core.tracking.calibration import TRACKED
 from pop_core.tracking.finder import FoundBody
 from pop_core.tracking.fresh_fits import FreshFit
 from pop_core.tracking.late_belief import caught_up, moved_on
@@ -52,9 +53,6 @@ MIN_SEEN = 0.04  # share of the body that must be seen for the frame to say anyt
 CONTRADICTED = 0.4  # a body is not where the camera saw through this share of it
 USUAL_SHARE = 0.05  # how fast the usual E_depth follows
 TRUSTED_SUPPORT = 0.5
-# Standard deviations are wider than the filter's own by this: frames err together, and a limb may
-# be taken for another (`python -m benchmarks tracking`, coverage rows).
-OVERSURE = 1.3
 HIDDEN_TURN_RAD = 0.5  # people hidden for a while come out much as they went in
 LESS_OPEN = 0.1  # share of a limb, by which a better place for it shows through less
 RESOLVED = 8.0  # cost that a body may be worse by for each joint that agrees with it instead
@@ -257,13 +255,15 @@ class Follower:
     ) -> BodyEstimate | None:
         """Update a track by a fit and return the person."""
         track.filter = updated(track.filter, fit)
-        hessian = (inverse(track.filter.covariance) + fit.curvature.prior) / OVERSURE**2
+        if lifted is not None:
+            track.unnamed = unnamed_joints(fit.state, lifted)
         body = fit.as_body_fit(
-            hessian, tuple(other.filter.parameters for other in track.alternatives))
+            inverse(track.filter.covariance) + fit.curvature.prior,
+            [self._body(other.filter) for other in track.alternatives], track.unnamed)
         if lifted is not None:
             track.trust = plausibility(body, lifted)
         body = self._smoothed(track, body)
-        estimate, support = self.pipeline.estimate(scene, body, track.trust)
+        estimate, support = self.pipeline.estimate(scene, body, track.trust, TRACKED)
         self._judge(track, fit, support, lifted)
         track.note_seen(estimate, self.config)
         if support < self.pipeline.config.min_support:
@@ -309,16 +309,15 @@ class Follower:
             state, self.pipeline.fitter.prior, self.config.prior_weight)
         turns = np.arange(3, N_MOVING)
         hessian[turns, turns] += HIDDEN_TURN_RAD**-2.0
+        # No energies: depth that shows none of the person does not speak against the body.
         body = BodyFit(
-            state.parameters, hessian, visibility, state, visibility.rendered.covered, {}, ())
-        estimate, _ = self.pipeline.estimate(scene, body, track.trust)
+            state.parameters, hessian, visibility, state, visibility.rendered.covered, {}, (),
+            disagreement(state, (), (), (), track.unnamed))
+        estimate, _ = self.pipeline.estimate(scene, body, track.trust, TRACKED)
         track.joint_state = estimate.joint_state
-        # Depth that shows none of the person does not speak against the body.
-        covariance = joint_covariance(
-            self.pipeline.model, state.parameters, hessian, (), estimate.joint_state)
         return replace(
             estimate, mask=np.zeros_like(estimate.mask), track=track.tag(),
-            joint_covariance=covariance, score=track.trust * float(np.exp(-track.unseen_s)))
+            score=track.trust * float(np.exp(-track.unseen_s)))
 
     def _body(self, belief: FilterState) -> BodyState:
         return self.pipeline.fitter.coarse.state(belief.parameters)

@@ -21,6 +21,10 @@ def _no_joints() -> Bool[np.ndarray, '15']:
     return np.zeros(N_SHARED, dtype=bool)
 
 
+def _no_bones() -> Bool[np.ndarray, '24']:
+    return np.zeros(N_JOINTS, dtype=bool)
+
+
 @dataclass(slots=True, eq=False)
 class Alternative:
     """Another explanation of a person, followed while the evidence cannot decide.
@@ -58,6 +62,7 @@ class PersonTrack:
         doubts: Detections, one after the other, after which something was still wrong.
         is_doubtful: Whether something was wrong in the last frame.
         misnamed: Shared joints whose left and right were exchanged at the last detection.
+        unnamed: Joints of limbs that no keypoint confirmed at the last detection.
         is_proven: Whether a look after the first one has agreed with the body.
         tries: Bodies that were taken over since a look last agreed with one.
         restarted_ns: When the body was last looked for anew.
@@ -88,6 +93,7 @@ class PersonTrack:
     doubts: int = 0
     is_doubtful: bool = False
     misnamed: Bool[np.ndarray, '15'] = field(default_factory=_no_joints)
+    unnamed: Bool[np.ndarray, '24'] = field(default_factory=_no_bones)
     is_proven: bool = False
     tries: int = 1
     restarted_ns: int = 0

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pop_core.body.model import BodyParameters
 from pop_core.fitting.body_fit import BodyFit, BodyFitter
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.depth_consistency import (
@@ -17,6 +17,7 @@ from pop_core.fitting.depth_consistency import (
     depth_energy,
     see_body,
 )
+from pop_core.fitting.disagreement import disagreement
 from pop_core.fitting.energy import PAIR_BLOCKS, PRIOR_BLOCKS, TermWeights
 from pop_core.fitting.levenberg_marquardt import (
     FIRST_DAMPING,
@@ -99,12 +100,21 @@ class WarmFit:
     of_limb: Float[np.ndarray, '4']
 
     def as_body_fit(
-        self, hessian: Float[np.ndarray, 'x x'], runners_up: tuple[BodyParameters, ...]
+        self, hessian: Float[np.ndarray, 'x x'], alternatives: Sequence[BodyState],
+        unnamed: Bool[np.ndarray, '24'],
     ) -> BodyFit:
-        """Return the fit as one of a single frame, with the curvature of all that is known."""
+        """Return the fit as one of a single frame.
+
+        Args:
+            hessian: Curvature of all that is known.
+            alternatives: Other explanations of the person.
+            unnamed: Joints of limbs that no keypoint confirmed at the last look.
+        """
+        left = disagreement(
+            self.state, alternatives, [0.0] * len(alternatives), (), unnamed)
         return BodyFit(
             self.state.parameters, hessian, self.visibility, self.state, self.segment,
-            self.energies, runners_up)
+            self.energies, tuple(other.parameters for other in alternatives), left)
 
 
 def updated(predicted: FilterState, fit: WarmFit) -> FilterState:

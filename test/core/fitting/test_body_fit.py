@@ -9,6 +9,7 @@ from pop_core.body.kinematics import attached_positions, joints
 from pop_core.body.model import BodyModel, BodyParameters, shared_points
 from pop_core.fitting.body_fit import BodyFit, BodyFitter
 from pop_core.fitting.body_state import FitBody
+from pop_core.fitting.calibration import SINGLE_FRAME
 from pop_core.fitting.correspondence import match_points
 from pop_core.fitting.depth_consistency import see_body
 from pop_core.fitting.observation import observe
@@ -86,8 +87,7 @@ def test_hidden_legs_have_larger_covariance_than_seen_arms(
     start = [disturbed(person, seed, 0.15) for seed in range(3)]
     result = fit(fitter, RgbdFrame(frame.rgb, depth, CAMERA),
                  lift_truth(body, person, LEGS), start)
-    covariance = joint_covariance(
-        body, result.parameters, result.hessian, result.runners_up, np.zeros(24, dtype=np.int64))
+    covariance = joint_covariance(body, result, np.zeros(24, dtype=np.int64), SINGLE_FRAME)
     sigma = np.sqrt(np.trace(covariance, axis1=1, axis2=2))
     np.testing.assert_allclose(covariance, covariance.transpose(0, 2, 1), atol=1e-12)
     assert (np.linalg.eigvalsh(covariance) > 0).all()
