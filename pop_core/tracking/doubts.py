@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+from jaxtyping import Bool
+
 from pop_core.body.joints import SHARED
 from pop_core.estimate import JointState, TrackState
-from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.tracking.detection_schedule import Gap
 from pop_core.tracking.fresh_fits import FreshFit
 from pop_core.tracking.track import PersonTrack
@@ -37,13 +39,17 @@ def is_doubtful(track: PersonTrack, gap: Gap) -> bool:
     return track.doubts >= MOST_DOUBTS and _restarted_ago_s(track) > RESTART_EVERY_S
 
 
-def has_outgrown_evidence(track: PersonTrack, lifted: LiftedJoints) -> bool:
+def has_outgrown_evidence(track: PersonTrack, seen: Bool[np.ndarray, 's']) -> bool:
     """Return whether most joints that are seen now were not yet when the body was looked for.
 
     Of who came out from behind a wall with a leg first, trunk and head are a guess that the
     first keypoints agree with.
+
+    Args:
+        track: The person.
+        seen: Shared joints that are surely seen.
     """
-    known = track.evidence[lifted.sure]
+    known = track.evidence[seen]
     return bool(known.size and known.mean() < 0.5)
 
 

@@ -26,6 +26,7 @@ from pop_core.tracking.body_filter import (
     with_known_shape,
 )
 from pop_core.tracking.calibration import TRACKED
+from pop_core.tracking.doubts import has_outgrown_evidence
 from pop_core.tracking.finder import FoundBody
 from pop_core.tracking.fresh_fits import FreshFit
 from pop_core.tracking.late_belief import caught_up, moved_on
@@ -163,9 +164,12 @@ class Follower:
         self, track: PersonTrack, fit: WarmFit, rival: FreshFit, observation: Observation
     ) -> WarmFit:
         """Return the better of what was followed and what was found anew."""
-        track.restarted_ns, track.doubts = track.now_ns, 0
         assert rival.person.body is not None
-        track.evidence = track.evidence | rival.person.body.evidence
+        seen = rival.person.body.evidence
+        if not has_outgrown_evidence(track, seen):
+            # What was compared for new evidence only puts off nothing that doubts ask for.
+            track.restarted_ns, track.doubts = track.now_ns, 0
+        track.evidence = track.evidence | seen
         belief = self._found_anew(track, rival, observation.lifted)
         other = self.warm.fit(belief, observation, self.config.steps, detected=True)
         ours, theirs = costs(self.warm.fitter, [fit, other], observation)
@@ -173,6 +177,7 @@ class Follower:
         if theirs >= ours - (BETTER if track.tries > 0 else MUCH_BETTER):
             track.tries += track.tries > 0
             return fit
+        track.restarted_ns, track.doubts = track.now_ns, 0
         track.tries += 1
         track.filter, track.depth_level = belief, None
         track.limb_rests = LimbRests()

@@ -206,7 +206,7 @@ class BodyTracker:
             astray = glimpse.offset_m(track.id, expected) > self.config.gate_m
             elsewhere = elsewhere or astray
             is_open = elsewhere or is_doubtful(track, self._gap) or (
-                has_outgrown_evidence(track, lifted))
+                has_outgrown_evidence(track, lifted.sure))
             late_s = self._late_s(track)
             if fresh is None and late_s == 0.0 and is_open:
                 with watch.step('restart'):
