@@ -15,7 +15,7 @@ from pop_core.fitting.uncertainty import Calibration, JointEvidence, covariances
 
 # Errors have heavier tails than a normal distribution: Student's t of so many degrees of freedom.
 FREEDOM = 7.0
-AIMS = ((CHI2_3_68, 0.72, 0.015), (CHI2_3_95, 0.93, 0.01))  # radius^2, share inside, tolerance
+AIMS = ((CHI2_3_68, 0.705, 0.015), (CHI2_3_95, 0.93, 0.01))  # radius^2, share inside, tolerance
 SOFTNESS = 0.12  # of the edge of an ellipsoid, in logarithms of squared radii
 LIKELIHOOD_WEIGHT = 1e-4  # per joint, beside the coverage: ellipsoids stay sharp
 FEWEST = 50  # joints of a group whose coverage counts
@@ -129,15 +129,15 @@ def _vector(calibration: Calibration) -> Float[np.ndarray, 'p']:
     odds = c.roundness / (1.0 - c.roundness)
     return np.concatenate([
         np.log(c.inflation).ravel(), np.log(np.maximum(positive, 1e-6)), [np.log(odds)],
-        [c.per_misfit / 10.0, c.per_strain], np.log(c.of_part)])
+        [c.per_misfit / 10.0, c.per_strain], np.log(c.of_part), [c.compression]])
 
 
 def _calibration(x: Float[np.ndarray, 'p'], start: Calibration) -> Calibration:
     """Invert `_vector`; the usual misfit and strain are those of `start`."""
     share, cost, named, unnamed, floor_m = np.exp(x[10:15]).tolist()
     return Calibration(
-        inflation=np.exp(x[:10]).reshape(2, 5), of_part=np.exp(x[18:]), rival_share=share,
-        rival_cost=cost, retrieved_share=(named, unnamed),
+        inflation=np.exp(x[:10]).reshape(2, 5), of_part=np.exp(x[18:21]), compression=float(x[21]),
+        rival_share=share, rival_cost=cost, retrieved_share=(named, unnamed),
         roundness=float(1.0 / (1.0 + np.exp(-x[15]))), floor_m=floor_m,
         per_misfit=float(10.0 * x[16]), per_strain=float(x[17]),
         usual_misfit_m=start.usual_misfit_m, usual_strain=start.usual_strain)

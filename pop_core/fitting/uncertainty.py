@@ -23,6 +23,7 @@ from pop_core.fitting.body_fit import BodyFit
 
 # Widest factor of standard deviations by misfit and strain together: beyond what was learned from.
 MOST_WIDENING = 4.0
+TYPICAL_M = 0.03  # standard deviation by the curvature of a joint like most
 ARM, LEG = ('elbow', 'wrist', 'hand'), ('knee', 'ankle', 'foot')
 PART_OF_JOINT = np.array([
     1 if name.endswith(ARM) else 2 if name.endswith(LEG) else 0 for name in JOINT_NAMES])
@@ -36,6 +37,9 @@ class Calibration:
         inflation: Factor of standard deviations by JointState; in the second row of limb joints
             that no keypoint names.
         of_part: Factor of standard deviations of trunk, arms and legs.
+        compression: How far the curvature's standard deviations are drawn toward TYPICAL_M: 0 not
+            at all, 1 to the same for all. Surfaces and priors count as more independent
+            measurements than they are.
         rival_share: Share of a runner-up that costs no more than the winner.
         rival_cost: Excess cost at which that share has fallen to 1/e.
         retrieved_share: Share of the spread of all started hypotheses: of joints, and of limb
@@ -50,6 +54,7 @@ class Calibration:
 
     inflation: Float[np.ndarray, '2 5']
     of_part: Float[np.ndarray, '3']
+    compression: float
     rival_share: float
     rival_cost: float
     retrieved_share: tuple[float, float]
@@ -139,7 +144,8 @@ def covariances(
     offset = evidence.rivals * np.sqrt(share)[..., None]
     unnamed = evidence.unnamed.astype(np.int64)
     retrieved = np.array(calibration.retrieved_share)[unnamed, None, None] * evidence.retrieved
-    whole = evidence.curvature + offset.transpose(0, 2, 1) @ offset + retrieved
+    disagreed = offset.transpose(0, 2, 1) @ offset + retrieved
+    whole = _compressed(evidence.curvature, calibration) + disagreed
     # Nobody knows which way a wrong limb is wrong: part of every direction's doubt is all's.
     mean = np.trace(whole, axis1=1, axis2=2) / 3.0
     variance = (
@@ -150,6 +156,15 @@ def covariances(
     out[:, diagonal, diagonal] += (
         calibration.roundness * variance * mean + calibration.floor_m**2)[:, None]
     return np.asarray(out)
+
+
+def _compressed(
+    curvature: Float[np.ndarray, 'n 3 3'], calibration: Calibration
+) -> Float[np.ndarray, 'n 3 3']:
+    """Return covariances drawn toward the usual size, shapes kept."""
+    mean = np.trace(curvature, axis1=1, axis2=2) / 3.0
+    factor = (np.maximum(mean, 1e-9) / TYPICAL_M**2) ** -calibration.compression
+    return np.asarray(factor[:, None, None] * curvature)
 
 
 def _widening(

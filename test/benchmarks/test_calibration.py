@@ -8,11 +8,20 @@ import pytest
 
 from benchmarks.calibration import figures, parse
 from benchmarks.calibration_fit import Sample, joined, learn, squared_radii
-from benchmarks.calibration_samples import load_sample, save_sample
+from benchmarks.calibration_samples import (
+    Witness,
+    load_sample,
+    save_sample,
+    scene_sample,
+    sequence_sample,
+)
 from benchmarks.metrics import CHI2_3_68, CHI2_3_95, share_within
 from pop_core.estimate import JointState
 from pop_core.fitting.calibration import SINGLE_FRAME
 from pop_core.fitting.uncertainty import Calibration, JointEvidence, covariances
+from pop_core.synthesis.sequence import SequenceConfig
+from pop_core.synthesis.sequence_names import SequenceKind
+from pop_core.tracking.calibration import TRACKED
 
 
 def drawn(truth: Calibration, seed: int, count: int = 1500, rivals: int = 1) -> Sample:
@@ -77,3 +86,27 @@ def test_wider_ellipsoids_hold_more_and_say_so() -> None:
 def test_as_many_scenes_as_asked_for_are_learned_from() -> None:
     options = parse(['tracks', '--learn', '1'])
     assert (options.learn, options.check) == (1, 2)
+
+
+@pytest.fixture(scope='module')
+def witness() -> Witness:
+    return Witness()
+
+
+def test_people_of_a_few_scenes_lie_in_their_ellipsoids(witness: Witness) -> None:
+    found = [scene_sample(witness, seed) for seed in range(700_000, 700_003)]
+    sample = joined([each for each in found if each is not None])
+    assert len(sample.truth) >= 3 * 24
+    squared, _ = squared_radii(sample, SINGLE_FRAME)
+    # A handful of people err together: far from all, and far from a half as few.
+    assert 0.5 < share_within(squared, CHI2_3_68) < 0.95
+    assert share_within(squared, CHI2_3_95) > 0.8
+
+
+def test_people_who_are_followed_lie_in_their_ellipsoids(witness: Witness) -> None:
+    film = SequenceConfig(SequenceKind.TABLE, 17, colour=False)
+    sample = sequence_sample(witness, 700_000, film)
+    assert sample is not None
+    # Every fourth frame, without the first, in which nobody is followed yet.
+    assert len(sample.truth) == 4 * 24
+    assert share_within(squared_radii(sample, TRACKED)[0], CHI2_3_95) > 0.7

@@ -102,6 +102,16 @@ def test_a_body_is_stated_alike_alone_and_among_others(calibration: Calibration)
         together, np.concatenate([covariances(part, calibration) for part in parts]))
 
 
+def test_the_curvature_is_drawn_toward_the_usual_size(calibration: Calibration) -> None:
+    bare = replace(calibration, rival_share=0.0, retrieved_share=(0.0, 0.0), floor_m=0.0)
+    usual = evidence()
+    sigma, wider = (
+        np.sqrt(np.trace(covariances(each, bare), axis1=1, axis2=2))
+        for each in (usual, replace(usual, curvature=100.0 * usual.curvature)))
+    # Ten times the standard deviation is stated as less, by the same factor for every joint.
+    np.testing.assert_allclose(wider / sigma, 10.0 ** (1.0 - calibration.compression))
+
+
 def test_nothing_widens_without_end(calibration: Calibration) -> None:
     hopeless = replace(evidence(), misfit_m=np.full(COUNT, 10.0))
     assert np.sqrt(np.linalg.eigvalsh(covariances(hopeless, calibration)).max()) < 2.0
