@@ -1,4 +1,4 @@
-"""A process that fits people from retrieved poses while the node follows the others.
+"""A process that finds people, or their lost limbs, while the node follows them.
 
 A second thread would share the interpreter with the one that follows, and make it half as fast.
 Jobs and answers are pickles on the two pipes of a child: it ends when the pipes do, so nothing is
@@ -13,21 +13,22 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import lru_cache
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeVar
 
 from threadpoolctl import ThreadpoolController
 
 from pop_core.config import PipelineConfig
 from pop_core.errors import PopError
 from pop_core.keypoints.detection import Detection
-from pop_core.pipeline import BodyPipeline, Scene
+from pop_core.pipeline import BodyPipeline
 from pop_core.rgbd import RgbdFrame
-from pop_core.tracking.finder import FoundPerson, find_person
 from pop_ros.sources import make_pipeline
 
-NICENESS = 5  # where processors are scarce those who are followed go first
+AnswerT = TypeVar('AnswerT')
+NICENESS = 10  # where processors are scarce those who are followed go first
 # Without caches the first answer takes minutes, any other a part of a second.
 FIRST_PATIENCE_S, PATIENCE_S = 600.0, 30.0
 # Not `-m`, which would look for modules in the working directory before all others.
@@ -58,11 +59,18 @@ class FindingProcess:
 
     def start(self) -> None:
         """Load body and library there; the first person would wait for them."""
-        self._waiting.submit(self._answer, (self._config, None, None))
+        self.submit(_nothing)
 
-    def submit(self, scene: Scene, detection: Detection) -> Future[FoundPerson]:
-        """Begin to fit a person; the future fails with `FindingError` if the process ends."""
-        return self._waiting.submit(self._answer, (self._config, scene, detection))
+    def submit(self, work: Callable[..., AnswerT], *inputs: Any) -> Future[AnswerT]:
+        """Begin `work(pipeline, *inputs)` there.
+
+        The future fails with `FindingError` if the process ends, and with the error of the work.
+
+        Args:
+            work: A function of a module.
+            inputs: What it is given, to be pickled.
+        """
+        return self._waiting.submit(self._answer, (self._config, work, inputs))
 
     def stop(self) -> None:
         """End the process, whatever it does."""
@@ -141,13 +149,12 @@ def _pipeline(config: PipelineConfig) -> BodyPipeline:
     return BodyPipeline(loaded.model, loaded.library, Nobody(), config, loaded.fitter.prior)
 
 
-def _found(
-    config: PipelineConfig, scene: Scene | None, detection: Detection | None
-) -> FoundPerson | None:
-    pipeline = _pipeline(config)
-    if scene is None or detection is None:
-        return None
-    return find_person(pipeline, scene, detection)
+def _nothing(_pipeline: BodyPipeline) -> None:
+    """Do nothing with a pipeline, which has been loaded for it."""
+
+
+def _done(config: PipelineConfig, work: Callable[..., AnswerT], inputs: Sequence[Any]) -> AnswerT:
+    return work(_pipeline(config), *inputs)
 
 
 def answer_jobs(jobs: BinaryIO, answers: BinaryIO) -> None:
@@ -157,9 +164,9 @@ def answer_jobs(jobs: BinaryIO, answers: BinaryIO) -> None:
             job = pickle.load(jobs)
         except EOFError:
             return
-        answer: FoundPerson | Exception | None
+        answer: Any
         try:
-            answer = _found(*job)
+            answer = _done(*job)
         except Exception as error:  # noqa: BLE001 - the node counts it and says it
             answer = error
         pickle.dump(answer, answers, protocol=pickle.HIGHEST_PROTOCOL)

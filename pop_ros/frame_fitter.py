@@ -12,7 +12,7 @@ from pop_core.estimate import FrameResult
 from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.pipeline import BodyPipeline
 from pop_core.rgbd import RgbdFrame
-from pop_core.tracking.fresh_fits import BackgroundFinder
+from pop_core.tracking.background import Background
 from pop_core.tracking.tracker import BodyTracker
 from pop_ros.body_messages import RECORDED_TYPES, BodyMessages, Output
 from pop_ros.frame_maker import FrameMaker
@@ -49,8 +49,9 @@ class FrameFitter:
         progress: Callable[[float, str], None] | None = None,
         frames: StaticFrames | None = None,
         *,
-        background: BackgroundFinder | None = None,
+        finding: Background | None = None,
         looking: LookingThread | None = None,
+        searching: Background | None = None,
     ) -> None:
         """Load body model and pose library, and compile kernels.
 
@@ -60,8 +61,9 @@ class FrameFitter:
             config: Settings of messages and of the tracker.
             progress: Told a share 0..1 and a sentence while a first library is generated.
             frames: Knows where a depth camera with a frame of its own stands.
-            background: Finds people anew while others are followed; None lets frames wait.
+            finding: Finds people anew while others are followed; None lets frames wait.
             looking: Asks the keypoint source while people are followed; None lets frames wait.
+            searching: Looks for lost limbs while people are followed; None lets frames wait.
 
         Raises:
             PopError: If one of them cannot be loaded.
@@ -69,7 +71,8 @@ class FrameFitter:
         apply_settings(detector, pipeline_config)
         self._looking = looking
         self._pipeline = make_pipeline(detector, pipeline_config, progress=progress)
-        self._tracker = BodyTracker(self._pipeline, config.tracking, background, looking)
+        self._tracker = BodyTracker(
+            self._pipeline, config.tracking, finding, looking, searching)
         self._messages = BodyMessages(self._pipeline.model, config)
         self._maker = FrameMaker(frames or StaticFrames())
         self._maker.extrinsics = parse_extrinsics(config.depth.extrinsics)

@@ -54,7 +54,8 @@ class FrameWork:
         self._latest: FittedFrame | None = None
         self._last_number = 0
         self._said_share = -1.0
-        self._finding, self._looking = FindingProcess(), LookingThread()
+        self._finding, self._searching = FindingProcess(), FindingProcess()
+        self._looking = LookingThread()
         self._worker: Worker[RgbdMessages] = Worker(
             self._fit, self._on_error, lambda: self._prepare(detector, frames))
         self._worker.start()
@@ -111,7 +112,8 @@ class FrameWork:
             self._statistics.add_drop(STOPPED)
         until_s = time.monotonic() + timeout_s
         finished = self._worker.stop(timeout_s)
-        self._finding.stop()
+        for process in (self._finding, self._searching):
+            process.stop()
         return self._looking.stop(max(until_s - time.monotonic(), 0.0)) and finished
 
     # Worker thread
@@ -123,7 +125,8 @@ class FrameWork:
             'ones read them from the cache')
         fitter = FrameFitter(
             detector, self._settings.pipeline_config, self._settings.node_config,
-            self._say_progress, frames, background=self._finding, looking=self._looking)
+            self._say_progress, frames, finding=self._finding, looking=self._looking,
+            searching=self._searching)
         self._outputs.publish_model(fitter.model)
         self._configure_finding()
         self._fitter = fitter
@@ -164,9 +167,10 @@ class FrameWork:
             self._configure_finding()
 
     def _configure_finding(self) -> None:
-        self._finding.configure(self._settings.pipeline_config)
-        if self._settings.node_config.tracking.enabled:
-            self._finding.start()
+        for process in (self._finding, self._searching):
+            process.configure(self._settings.pipeline_config)
+            if self._settings.node_config.tracking.enabled:
+                process.start()
 
     def _reset(self) -> None:
         if self._fitter is not None:

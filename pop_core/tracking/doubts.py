@@ -12,7 +12,8 @@ from pop_core.tracking.fresh_fits import FreshFit
 from pop_core.tracking.track import PersonTrack
 
 STALE_S = 0.25  # unseen for longer, a person is looked for anew
-MOST_DOUBTS, RESTART_EVERY_S = 2, 1.0
+# Who is followed well is looked for anew rarely, and ever more so while nothing better is found.
+MOST_DOUBTS, RESTART_EVERY_S, RAREST_RESTART_S = 2, 1.0, 4.0
 # A body that no look has agreed with yet is looked for anew soon, then ever more rarely [s].
 FIRST_WAIT_S, LONGEST_WAIT_S = 0.05, 1.6
 MOST_MISSES = 3
@@ -36,7 +37,8 @@ def is_doubtful(track: PersonTrack, gap: Gap) -> bool:
     if track.tries > 0:
         wait_s = min(FIRST_WAIT_S * 2.0 ** (track.tries - 1), LONGEST_WAIT_S)
         return track.doubts > 0 and _restarted_ago_s(track) > wait_s
-    return track.doubts >= MOST_DOUBTS and _restarted_ago_s(track) > RESTART_EVERY_S
+    wait_s = min(RESTART_EVERY_S * 2.0**track.rivals_beaten, RAREST_RESTART_S)
+    return track.doubts >= MOST_DOUBTS and _restarted_ago_s(track) > wait_s
 
 
 def has_outgrown_evidence(track: PersonTrack, seen: Bool[np.ndarray, 's']) -> bool:

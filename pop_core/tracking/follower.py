@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool
 
-from pop_core.body.model import BodyParameters
 from pop_core.estimate import BodyEstimate
 from pop_core.fitting.body_fit import BodyFit
 from pop_core.fitting.body_state import BodyState
@@ -30,17 +28,16 @@ from pop_core.tracking.doubts import has_outgrown_evidence
 from pop_core.tracking.finder import FoundBody
 from pop_core.tracking.fresh_fits import FreshFit
 from pop_core.tracking.late_belief import caught_up, moved_on
-from pop_core.tracking.limb_claims import limbs_of, open_shares
+from pop_core.tracking.late_limbs import LateLimbs, LimbQuestion, with_found_limbs
+from pop_core.tracking.limb_recovery import LimbRecovery, LostLimbs
 from pop_core.tracking.limb_rest import LimbRests
-from pop_core.tracking.limb_search import LimbSearch
-from pop_core.tracking.limbs import contradicted_joints, limbs_in_the_open, loosened, lost_limbs
+from pop_core.tracking.limbs import contradicted_joints
 from pop_core.tracking.liveliness import followed_trail, liveliness
 from pop_core.tracking.motion import N_MOVING
 from pop_core.tracking.rivals import (
     BETTER,
     MUCH_BETTER,
     costs,
-    costs_over,
     follow_alternatives,
 )
 from pop_core.tracking.sides import misnamed_joints, without_joints
@@ -55,18 +52,18 @@ CONTRADICTED = 0.4  # a body is not where the camera saw through this share of i
 USUAL_SHARE = 0.05  # how fast the usual E_depth follows
 TRUSTED_SUPPORT = 0.5
 HIDDEN_TURN_RAD = 0.5  # people hidden for a while come out much as they went in
-LESS_OPEN = 0.1  # share of a limb, by which a better place for it shows through less
-RESOLVED = 8.0  # cost that a body may be worse by for each joint that agrees with it instead
 
 
 class Follower:
     """Follows people with the terms of one pipeline."""
 
-    def __init__(self, pipeline: BodyPipeline, config: TrackingConfig) -> None:
-        """Use a pipeline's model, fitter and settings."""
-        self.pipeline, self.config = pipeline, config
+    def __init__(
+        self, pipeline: BodyPipeline, config: TrackingConfig, late_limbs: LateLimbs
+    ) -> None:
+        """Use a pipeline's model, fitter and settings, and whoever looks for lost limbs."""
+        self.pipeline, self.config, self.late_limbs = pipeline, config, late_limbs
         self.warm = WarmStart(pipeline.fitter, config.prior_weight)
-        self.limb_search = LimbSearch(pipeline.fitter.prior)
+        self.recovery = LimbRecovery(self.warm, config.steps)
 
     def predict(self, track: PersonTrack, now_ns: int) -> None:
         """Move a track's beliefs to the time of a frame."""
@@ -78,6 +75,7 @@ class Follower:
         track.left_m = float(np.linalg.norm(joints - track.trail, axis=1).max())
         lively = liveliness(joints, track.trail, track.joint_state)
         track.filter = predict(track.filter, self.pipeline.model, track.gap_s, lively)
+        track.filter = self._with_late_limbs(track)
         for other in track.alternatives:
             other.filter = predict(other.filter, self.pipeline.model, track.gap_s)
 
@@ -125,7 +123,7 @@ class Follower:
         assert fresh.person.body is not None
         self.begin(track, fresh.person.body)
         track.tries += 1
-        track.limb_rests = LimbRests()
+        self._forget_limbs(track)
         late_s = (track.now_ns - fresh.stamp_ns) * 1e-9
         for other in track.alternatives:
             other.filter = moved_on(other.filter, self.pipeline.fitter.coarse, late_s, lifted)
@@ -176,11 +174,13 @@ class Follower:
         # Keypoints of one frame err together: who was followed well is believed more than them.
         if theirs >= ours - (BETTER if track.tries > 0 else MUCH_BETTER):
             track.tries += track.tries > 0
+            track.rivals_beaten += 1
             return fit
         track.restarted_ns, track.doubts = track.now_ns, 0
         track.tries += 1
+        track.rivals_beaten = 0
         track.filter, track.depth_level = belief, None
-        track.limb_rests = LimbRests()
+        self._forget_limbs(track)
         track.alternatives.clear()
         return other
 
@@ -199,61 +199,29 @@ class Follower:
         self, track: PersonTrack, fit: WarmFit, observation: Observation, lifted: LiftedJoints
     ) -> WarmFit:
         """Look anew for limbs that keypoints contradict, or depth; return the better fit."""
-        for loose in lost_limbs(contradicted_joints(fit.state, lifted)):
-            fit = self._unless_it_rests(track, fit, observation, lifted, loose)
-        for loose in limbs_in_the_open(
-                open_shares(fit.state, fit.visibility, observation)):
-            fit = self._unless_it_rests(track, fit, observation, lifted, loose)
-        return fit
-
-    def _unless_it_rests(
-        self, track: PersonTrack, fit: WarmFit, observation: Observation, lifted: LiftedJoints,
-        loose: Bool[np.ndarray, '24'],
-    ) -> WarmFit:
-        """Look for a limb, but not in every frame for one that is never found."""
-        if track.limb_rests.rests(loose, track.now_ns):
+        resting = track.limb_rests.resting(track.now_ns)
+        lost = LostLimbs(track.filter, fit, observation, lifted, resting)
+        if not self.late_limbs.waits:
+            if lost.any_awake:
+                self.late_limbs.ask(track.id, LimbQuestion.of(lost, self.config))
             return fit
-        other = self._with_limb_found(track, fit, observation, lifted, loose)
-        if other is fit:
-            track.limb_rests.missed(loose, track.now_ns)
-        else:
-            track.limb_rests.found(loose)
-        return other
+        recovery = self.recovery.recover(lost)
+        track.limb_rests.note(recovery.tried, track.now_ns)
+        track.filter = recovery.belief
+        return recovery.fit or fit
 
-    def _with_limb_found(
-        self, track: PersonTrack, fit: WarmFit, observation: Observation, lifted: LiftedJoints,
-        loose: Bool[np.ndarray, '24'],
-    ) -> WarmFit:
-        """Return a fit with some limbs looked for anew, if that explains more."""
-        found = self.limb_search.find(fit.state, observation, loose)
-        if self._is_in_vain(found, fit, observation, lifted):
-            return fit
-        free = replace(loosened(track.filter, loose), parameters=found)
-        other = self.warm.fit(
-            free, observation, self.config.steps, detected=True, loose=loose)
-        ours, theirs = costs(self.warm.fitter, [fit, other], observation)
-        before, after = (contradicted_joints(f.state, lifted).sum() for f in (fit, other))
-        # A keypoint may itself be wrong: a limb is where measured points are its own, and not
-        # where the camera saw through.
-        limbs = limbs_of(loose)
-        is_seen = other.of_limb[limbs].sum() > fit.of_limb[limbs].sum()
-        opened, closed = (
-            open_shares(f.state, f.visibility, observation)[limbs].max() for f in (fit, other))
-        is_hidden = closed < opened - LESS_OPEN
-        if theirs >= ours + RESOLVED * int(before - after) or not (is_seen or is_hidden):
-            return fit
-        track.filter = free
-        return other
+    def _forget_limbs(self, track: PersonTrack) -> None:
+        """Forget what was looked for in another body."""
+        track.limb_rests = LimbRests()
+        self.late_limbs.forget(track.id)
 
-    def _is_in_vain(
-        self, found: BodyParameters, fit: WarmFit, observation: Observation,
-        lifted: LiftedJoints,
-    ) -> bool:
-        """Return whether a limb was found where so much speaks against it that no fit mends it."""
-        bodies = [fit.state, self.pipeline.fitter.coarse.state(found)]
-        ours, theirs = costs_over(self.warm.fitter, bodies, observation, fit.segment)
-        resolved = max(int(contradicted_joints(fit.state, lifted).sum()), 1)
-        return theirs > ours + RESOLVED * resolved
+    def _with_late_limbs(self, track: PersonTrack) -> FilterState:
+        """Return a belief with the limbs that were found since the last frame."""
+        answer = self.late_limbs.take(track.id)
+        if answer is None:
+            return track.filter
+        track.limb_rests.note(answer.tried, track.now_ns)
+        return with_found_limbs(track.filter, answer)
 
     def _accept(
         self, track: PersonTrack, scene: Scene, fit: WarmFit, lifted: LiftedJoints | None

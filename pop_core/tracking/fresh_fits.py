@@ -10,20 +10,11 @@ from __future__ import annotations
 from collections.abc import Collection
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 from pop_core.keypoints.detection import Detection
 from pop_core.pipeline import BodyPipeline, Scene
+from pop_core.tracking.background import Background
 from pop_core.tracking.finder import FoundPerson, find_person
-
-
-@runtime_checkable
-class BackgroundFinder(Protocol):
-    """Whoever fits people meanwhile."""
-
-    def submit(self, scene: Scene, detection: Detection) -> Future[FoundPerson]:
-        """Begin what `find_person` does."""
-        ...
 
 
 @dataclass(slots=True, eq=False)
@@ -59,7 +50,7 @@ class FreshFit:
 class FreshFits:
     """Has one fit at a time made, and keeps it until it is called for."""
 
-    def __init__(self, background: BackgroundFinder | None = None) -> None:
+    def __init__(self, background: Background | None = None) -> None:
         """Have fits made meanwhile; None makes each while it is asked for."""
         self._background = background
         self._asked: Asked | None = None
@@ -101,7 +92,8 @@ class FreshFits:
             future.set_result(find_person(pipeline, scene, detection))
             self._asked = Asked(track, stamp_ns, future, is_ready=True)
         else:
-            self._asked = Asked(track, stamp_ns, self._background.submit(scene, detection))
+            future = self._background.submit(find_person, scene, detection)
+            self._asked = Asked(track, stamp_ns, future)
 
     def take(self, track: int | None) -> FreshFit | None:
         """Return the fit of a track, or of somebody new, once it is ready.

@@ -6,6 +6,7 @@ is seldom found in the next.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -36,9 +37,17 @@ class LimbRests:
     until_ns: Int[np.ndarray, '24'] = field(default_factory=_awake)
     rest_s: Float[np.ndarray, '24'] = field(default_factory=_rested)
 
-    def rests(self, limb: Bool[np.ndarray, '24'], now_ns: int) -> bool:
-        """Return whether all joints of a limb rest."""
-        return bool((self.until_ns[limb] > now_ns).all())
+    def resting(self, now_ns: int) -> Bool[np.ndarray, '24']:
+        """Return the joints that are not looked for."""
+        return self.until_ns > now_ns
+
+    def note(self, tried: Iterable[tuple[Bool[np.ndarray, '24'], bool]], now_ns: int) -> None:
+        """Note which limbs were looked for, in order, and whether each was found."""
+        for limb, is_found in tried:
+            if is_found:
+                self.found(limb)
+            else:
+                self.missed(limb, now_ns)
 
     def found(self, limb: Bool[np.ndarray, '24']) -> None:
         """Note that a limb was found: should it be lost again, it is looked for at once."""

@@ -14,7 +14,7 @@ from pop_core.fitting.hypotheses import Hypothesis
 from pop_core.fitting.observation import Observation
 from pop_core.tracking.track import PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
-from pop_core.tracking.warm_start import WarmFit, WarmStart, updated
+from pop_core.tracking.warm_start import FollowedBody, WarmFit, WarmStart, updated
 
 SAME_M = 0.04  # explanations nearer to each other than this, mean over joints, are one
 DECIDED = 40.0  # summed cost that decides between two of them
@@ -24,7 +24,7 @@ LARGEST = 10.0  # of one frame: no single frame decides
 
 
 def costs(
-    fitter: BodyFitter, fits: Sequence[WarmFit], observation: Observation
+    fitter: BodyFitter, fits: Sequence[FollowedBody], observation: Observation
 ) -> list[float]:
     """Return the cost of each fit by E_depth, keypoints and priors, on common pixels."""
     common: Bool[np.ndarray, 'h w'] = np.mean([fit.segment for fit in fits], axis=0) >= 0.5

@@ -65,6 +65,7 @@ class PersonTrack:
         unnamed: Joints of limbs that no keypoint confirmed at the last detection.
         is_proven: Whether a look after the first one has agreed with the body.
         tries: Bodies that were taken over since a look last agreed with one.
+        rivals_beaten: Bodies found anew, one after the other, that were no better.
         restarted_ns: When the body was last looked for anew.
         evidence: Shared joints that were surely seen when it was.
         trail: Where the joints were of late, None before the second frame [m].
@@ -96,6 +97,7 @@ class PersonTrack:
     unnamed: Bool[np.ndarray, '24'] = field(default_factory=_no_bones)
     is_proven: bool = False
     tries: int = 1
+    rivals_beaten: int = 0
     restarted_ns: int = 0
     evidence: Bool[np.ndarray, '15'] = field(default_factory=_no_joints)
     trail: Float[np.ndarray, '24 3'] | None = None

@@ -16,6 +16,7 @@ from pop_core.rgbd import RgbdFrame, distort_mask, undistort_frame
 from pop_core.segmentation.ground import Ground
 from pop_core.stopwatch import Stopwatch
 from pop_core.tracking.association import Expected, associate, behind_others
+from pop_core.tracking.background import Background
 from pop_core.tracking.body_filter import first_state
 from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, Gap
 from pop_core.tracking.doubts import (
@@ -29,7 +30,8 @@ from pop_core.tracking.doubts import (
 )
 from pop_core.tracking.finder import Finder
 from pop_core.tracking.follower import Follower
-from pop_core.tracking.fresh_fits import BackgroundFinder, FreshFit, FreshFits
+from pop_core.tracking.fresh_fits import FreshFit, FreshFits
+from pop_core.tracking.late_limbs import LateLimbs
 from pop_core.tracking.looks import Glimpse, Look, Lookout, Looks, look_for_people
 from pop_core.tracking.track import PersonTrack, new_track
 from pop_core.tracking.tracking_config import TrackingConfig
@@ -42,16 +44,24 @@ class BodyTracker:
 
     def __init__(
         self, pipeline: BodyPipeline, config: TrackingConfig | None = None,
-        background: BackgroundFinder | None = None, lookout: Lookout | None = None,
+        finding: Background | None = None, lookout: Lookout | None = None,
+        searching: Background | None = None,
     ) -> None:
         """Prepare to follow people with a pipeline's model, detector and settings.
 
-        Given somebody who finds people anew meanwhile, and somebody who looks for them, nobody
-        waits for that but the person, as camera rate asks for; without, frames give the same
-        bodies on any machine.
+        Given somebody who does that meanwhile, nobody waits but the person, as camera rate asks
+        for; without, frames give the same bodies on any machine.
+
+        Args:
+            pipeline: Model, detector and settings.
+            config: How people are followed.
+            finding: Fits people from retrieved poses.
+            lookout: Asks the detector.
+            searching: Looks for lost limbs.
         """
         self._blas = ThreadpoolController()
-        self._fresh, self._looks = FreshFits(background), Looks(lookout)
+        self._fresh, self._looks = FreshFits(finding), Looks(lookout)
+        self._late_limbs = LateLimbs(searching)
         self._next_id = 0
         self._tracks: list[PersonTrack] = []
         self._gap = Gap(0.0)
@@ -64,7 +74,8 @@ class BodyTracker:
     def configure(self, pipeline: BodyPipeline, config: TrackingConfig) -> None:
         """Take over other settings, or a pipeline of the same body model; people stay known."""
         self.pipeline, self.config = pipeline, config
-        self._follower, self._finder = Follower(pipeline, config), Finder(pipeline)
+        self._follower = Follower(pipeline, config, self._late_limbs)
+        self._finder = Finder(pipeline)
         self._schedule = DetectionSchedule(config)
 
     def reset(self) -> None:
@@ -91,6 +102,7 @@ class BodyTracker:
         self._gap = Gap(
             np.inf if self._last is None else (frame.stamp_ns - self._last[1]) * 1e-9, skipped)
         self._last = frame.camera, frame.stamp_ns
+        self._late_limbs.begin(wait=self._gap.is_of_slow_camera)
         with watch.step('undistort'):
             seen = undistort_frame(frame)
         is_late = self._fresh.poll()
@@ -112,6 +124,7 @@ class BodyTracker:
         self._tracks.clear()
         self._fresh.forget()
         self._looks.forget()
+        self._late_limbs.forget_unless(())
         self._refused = None
         self._last, self._ground = None, None
         self._schedule = DetectionSchedule(self.config)
@@ -174,7 +187,9 @@ class BodyTracker:
                     bodies.append(estimate)
                     scene = replace(scene, taken=scene.taken | estimate.mask)
         self._tracks = [t for t in self._tracks if not t.has_ended(self.config)]
-        self._fresh.forget_unless({track.id for track in self._tracks})
+        known = {track.id for track in self._tracks}
+        self._fresh.forget_unless(known)
+        self._late_limbs.forget_unless(known)
         return bodies, statuses
 
     def _matches(self, look: Look, expected: Sequence[Expected]) -> dict[int, Glimpse]:

@@ -80,24 +80,31 @@ class SeenBody:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WarmFit:
-    """A body followed into a frame.
+class FollowedBody(SeenBody):
+    """A body, and what of an image is its own.
 
     Args:
         state: The body on the coarse mesh.
         visibility: Sight of the coarse mesh.
         segment: Pixels of the observation that show the person.
-        curvature: J'WJ of measurements and priors.
-        energies: Final energies by name.
         of_limb: Weight of the measured points that each of `limb_claims.LIMBS` claims.
     """
 
-    state: BodyState
-    visibility: Visibility
     segment: Bool[np.ndarray, 'h w']
+    of_limb: Float[np.ndarray, '4']
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WarmFit(FollowedBody):
+    """A body followed into a frame.
+
+    Args:
+        curvature: J'WJ of measurements and priors.
+        energies: Final energies by name.
+    """
+
     curvature: Curvature
     energies: dict[str, float]
-    of_limb: Float[np.ndarray, '4']
 
     def as_body_fit(
         self, hessian: Float[np.ndarray, 'x x'], alternatives: Sequence[BodyState],
@@ -180,7 +187,7 @@ class WarmStart:
             'E_NN': cost_of(blocks[PAIR_BLOCKS]) + surface.spread,
             'E_depth': depth_energy(visibility.rendered, observation, segment),
         }
-        return WarmFit(state, visibility, segment, curvature, energies, surface.of_limb)
+        return WarmFit(state, visibility, segment, surface.of_limb, curvature, energies)
 
 
 def farthest_joint_m(state: BodyState, observation: Observation) -> float:

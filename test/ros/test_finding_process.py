@@ -65,38 +65,38 @@ def test_it_finds_whom_the_node_itself_would_find_with_the_settings_of_the_momen
     finding: FindingProcess, stage: Stage, seen: tuple[Scene, Detection]
 ) -> None:
     finding.start()
-    there = finding.submit(*seen).result(WAIT_S)
+    there = finding.submit(find_person, *seen).result(WAIT_S)
     here = find_person(stage.tracker.pipeline, *seen)
     np.testing.assert_array_equal(there.estimate.vertices, here.estimate.vertices)
     np.testing.assert_array_equal(there.body.hessian, here.body.hessian)
     finding.configure(PipelineConfig(max_range_m=1.0))
-    assert finding.submit(*seen).result(WAIT_S).status is EstimateStatus.TOO_FAR
+    assert finding.submit(find_person, *seen).result(WAIT_S).status is EstimateStatus.TOO_FAR
 
 
 def test_an_error_there_is_an_error_here_and_a_dead_process_is_replaced(
     finding: FindingProcess, seen: tuple[Scene, Detection]
 ) -> None:
     with pytest.raises(AttributeError):
-        finding.submit('no scene', seen[1]).result(WAIT_S)
-    waiting = finding.submit(*seen)
+        finding.submit(find_person, 'no scene', seen[1]).result(WAIT_S)
+    waiting = finding.submit(find_person, *seen)
     os.kill(child_of(finding), signal.SIGKILL)
     with pytest.raises(FindingError, match='ended with code -9'):
         waiting.result(WAIT_S)
-    assert finding.submit(*seen).result(WAIT_S).status is EstimateStatus.OK
+    assert finding.submit(find_person, *seen).result(WAIT_S).status is EstimateStatus.OK
 
 
 def test_a_process_that_hangs_is_ended_and_replaced(
     finding: FindingProcess, seen: tuple[Scene, Detection], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    finding.submit(*seen).result(WAIT_S)
+    finding.submit(find_person, *seen).result(WAIT_S)
     hung = child_of(finding)
     monkeypatch.setattr(finding_process, 'PATIENCE_S', 0.5)
     os.kill(hung, signal.SIGSTOP)
     with pytest.raises(FindingError, match='ended with code -9 after 0'):
-        finding.submit(*seen).result(WAIT_S)
+        finding.submit(find_person, *seen).result(WAIT_S)
     assert not is_running(hung)
     # The first answer of its successor may take as long as loading does.
-    assert finding.submit(*seen).result(WAIT_S).status is EstimateStatus.OK
+    assert finding.submit(find_person, *seen).result(WAIT_S).status is EstimateStatus.OK
 
 
 def test_half_an_answer_is_not_taken_for_a_part_of_the_next(
@@ -106,9 +106,9 @@ def test_half_an_answer_is_not_taken_for_a_part_of_the_next(
         'import pickle, sys; d = pickle.dumps([0] * 9); sys.stdout.buffer.write(d[:-5]); '
         'sys.stdout.flush(); sys.stdin.buffer.read(1)'))
     with pytest.raises(FindingError):
-        finding.submit(*seen).result(WAIT_S)
+        finding.submit(find_person, *seen).result(WAIT_S)
     monkeypatch.undo()
-    assert finding.submit(*seen).result(WAIT_S).status is EstimateStatus.OK
+    assert finding.submit(find_person, *seen).result(WAIT_S).status is EstimateStatus.OK
 
 
 def test_where_no_process_can_be_started_it_is_said(
@@ -117,7 +117,7 @@ def test_where_no_process_can_be_started_it_is_said(
     monkeypatch.setattr(sys, 'executable', '/nowhere/python')
     finding.start()
     with pytest.raises(FindingError, match=r'found none: .*nowhere'):
-        finding.submit(*seen).result(WAIT_S)
+        finding.submit(find_person, *seen).result(WAIT_S)
 
 
 def test_stopping_while_a_dead_process_is_replaced_leaves_none(
@@ -131,7 +131,7 @@ def test_stopping_while_a_dead_process_is_replaced_leaves_none(
         return started()
 
     monkeypatch.setattr(finding_process, '_started', slowly_started)
-    waiting = finding.submit(*seen)
+    waiting = finding.submit(find_person, *seen)
     assert replacing.wait(WAIT_S)
     finding.stop()
     with pytest.raises(FindingError):
@@ -145,7 +145,7 @@ def test_modules_of_the_working_directory_are_not_taken_for_those_of_the_node(
 ) -> None:
     (tmp_path / 'pickle.py').write_text('raise SystemExit(3)')
     monkeypatch.chdir(tmp_path)
-    assert finding.submit(*seen).result(WAIT_S).status is EstimateStatus.OK
+    assert finding.submit(find_person, *seen).result(WAIT_S).status is EstimateStatus.OK
 
 
 @pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGINT])

@@ -12,7 +12,7 @@ from pop_core.keypoints.detection import Detection
 from pop_core.pipeline import BodyPipeline
 from pop_core.retrieval.default_library import default_library
 from pop_core.rgbd import RgbdFrame
-from pop_core.tracking.fresh_fits import BackgroundFinder
+from pop_core.tracking.background import Background
 from pop_core.tracking.looks import Lookout
 from pop_core.tracking.tracker import BodyTracker
 from pop_core.tracking.tracking_config import TrackingConfig
@@ -43,11 +43,12 @@ class Stage:
 
     def __init__(
         self, body: BodyModel, config: TrackingConfig | None = None,
-        background: BackgroundFinder | None = None, lookout: Lookout | None = None,
+        finding: Background | None = None, lookout: Lookout | None = None,
+        searching: Background | None = None,
     ) -> None:
         self.body, self.source = body, Scripted(body)
         pipeline = BodyPipeline(body, default_library(), self.source)
-        self.tracker = BodyTracker(pipeline, config, background, lookout)
+        self.tracker = BodyTracker(pipeline, config, finding, lookout, searching)
         self.stamp_ns, self.statuses = 1_000_000_000, ()
 
     def show(

@@ -54,6 +54,17 @@ def test_a_body_that_no_look_agreed_with_is_looked_for_soon_then_ever_more_rarel
     assert not is_doubtful(track, FRAME)  # one contradiction of who was followed well
 
 
+def test_who_is_followed_well_is_looked_for_ever_more_rarely_while_nothing_better_is_found(
+    track: PersonTrack
+) -> None:
+    track.doubts, track.tries = 2, 0
+    waits = []
+    for track.rivals_beaten in (0, 1, 2, 9):
+        waits.append(first_doubtful_s(track))
+    assert (np.diff(waits[:3]) > 0).all()
+    assert waits[3] == pytest.approx(waits[2])
+
+
 def test_looks_prove_a_body(followed: Stage, track: PersonTrack) -> None:
     assert track.is_proven
     assert track.tries == 0

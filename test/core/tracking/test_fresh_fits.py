@@ -1,51 +1,25 @@
 """People found anew beside the others: who waits, who does not, and what comes in late."""
 
-from concurrent.futures import Future
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.late import Late
 from support.stage import RATE_HZ, Stage, only
 
 from pop_core.body.kinematics import joints
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.depth_noise import USUAL_NOISE
 from pop_core.estimate import EstimateStatus, TrackState
-from pop_core.keypoints.detection import Detection
 from pop_core.pipeline import BodyPipeline, Scene
 from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, Gap
-from pop_core.tracking.finder import FoundPerson, find_person
+from pop_core.tracking.finder import FoundPerson
 from pop_core.tracking.fresh_fits import FreshFits
 from pop_core.tracking.track import PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
 
 STEP_M = 0.05
 TO_THE_LEFT_M = -0.9
-
-
-class Late:
-    """Finds people when it is told to."""
-
-    def __init__(self) -> None:
-        self.waiting: list[tuple[Future, Scene, Detection]] = []
-        self.asked, self.pipeline = 0, None
-
-    def submit(self, scene: Scene, detection: Detection) -> Future:
-        self.asked += 1
-        self.waiting.append((Future(), scene, detection))
-        return self.waiting[-1][0]
-
-    def finish(self) -> None:
-        """Finish what waits."""
-        for future, scene, detection in self.waiting:
-            future.set_result(find_person(self.pipeline, scene, detection))
-        self.waiting.clear()
-
-    def fail(self) -> None:
-        """Fail to do what waits."""
-        for future, _, _ in self.waiting:
-            future.set_exception(MemoryError())
-        self.waiting.clear()
 
 
 def newcomer(person: BodyParameters, step: int) -> BodyParameters:
@@ -59,7 +33,7 @@ def late() -> Late:
 
 @pytest.fixture
 def stage(body: BodyModel, late: Late) -> Stage:
-    made = Stage(body, background=late)
+    made = Stage(body, finding=late)
     late.pipeline = made.tracker.pipeline
     return made
 
@@ -177,7 +151,7 @@ def test_who_was_fitted_in_vain_is_told_why(
     stage: Stage, late: Late, person: BodyParameters
 ) -> None:
     here = waiting_newcomer(stage, person)
-    (future, _, _), = late.waiting
+    (future, *_), = late.waiting
     late.waiting.clear()
     future.set_result(FoundPerson(EstimateStatus.NO_SUPPORT))
     looks = stage.source.asked
