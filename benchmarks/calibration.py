@@ -109,6 +109,8 @@ def collect(jobs: dict[str, Maker], console: Console, label: str) -> Sample:
             if sample is not None:
                 save_sample(path, sample)
                 samples.append(sample)
+    if not samples:
+        raise SystemExit(f'calibration: expected people {label}, found nobody: ask for more')
     return joined(samples)
 
 

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.calibration import figures, parse
+from benchmarks.accuracy import make_console
+from benchmarks.calibration import collect, figures, parse
 from benchmarks.calibration_fit import Sample, joined, learn, squared_radii
 from benchmarks.calibration_samples import (
     Witness,
@@ -86,6 +87,11 @@ def test_wider_ellipsoids_hold_more_and_say_so() -> None:
 def test_as_many_scenes_as_asked_for_are_learned_from() -> None:
     options = parse(['tracks', '--learn', '1'])
     assert (options.learn, options.check) == (1, 2)
+
+
+def test_nobody_to_learn_from_is_said_in_a_line() -> None:
+    with pytest.raises(SystemExit, match='found nobody'):
+        collect({}, make_console(), 'to learn from')
 
 
 @pytest.fixture(scope='module')
