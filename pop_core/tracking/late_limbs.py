@@ -27,6 +27,7 @@ from pop_core.tracking.tracking_config import TrackingConfig
 from pop_core.tracking.warm_start import FollowedBody, SeenBody, WarmStart
 
 LATE_RAD = 0.3  # how far a limb may have turned while it was looked for
+MOST_FAILURES = 3  # each costs a frame; where no help is to be had, frames wait instead
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +111,7 @@ class LateLimbs:
         """Have searches made meanwhile; None has everybody wait for them."""
         self._background = background
         self._asked: dict[int, Future[LimbAnswer]] = {}
-        self._waits = True
+        self._waits, self._failures = True, 0
 
     def begin(self, *, wait: bool) -> None:
         """Begin a frame; `wait` where there is time to wait for searches."""
@@ -119,7 +120,8 @@ class LateLimbs:
     @property
     def waits(self) -> bool:
         """Return whether limbs are to be looked for in the frame itself."""
-        return self._waits or self._background is None
+        return (
+            self._waits or self._background is None or self._failures >= MOST_FAILURES)
 
     def ask(self, track: int, question: LimbQuestion) -> None:
         """Have the limbs of a track looked for, unless they already are."""
@@ -136,6 +138,7 @@ class LateLimbs:
         if asked is None or not asked.done():
             return None
         del self._asked[track]
+        self._failures += asked.exception() is not None
         return asked.result()
 
     def forget(self, track: int) -> None:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.late import Late
 from support.one_person import lift_truth, photograph
 from support.stage import Scripted
 
@@ -14,7 +15,13 @@ from pop_core.fitting.observation import observe
 from pop_core.pipeline import BodyPipeline
 from pop_core.retrieval.default_library import default_library
 from pop_core.tracking.body_filter import first_state
-from pop_core.tracking.late_limbs import LimbQuestion, find_limbs, with_found_limbs
+from pop_core.tracking.late_limbs import (
+    MOST_FAILURES,
+    LateLimbs,
+    LimbQuestion,
+    find_limbs,
+    with_found_limbs,
+)
 from pop_core.tracking.limb_recovery import LimbRecovery, LostLimbs
 from pop_core.tracking.limbs import contradicted_joints
 from pop_core.tracking.tracking_config import TrackingConfig
@@ -103,3 +110,19 @@ def test_a_limb_found_elsewhere_is_the_one_found_here_and_only_it_is_moved(
     grown = np.diag(belief.covariance) > np.diag(lost.belief.covariance)
     np.testing.assert_array_equal(grown[3:75].reshape(24, 3).all(axis=1), limb)
     assert grown.sum() == 3 * limb.sum()
+
+
+def test_where_searches_fail_again_and_again_frames_wait_for_them_instead(
+    pipeline: BodyPipeline, body: BodyModel, person: BodyParameters
+) -> None:
+    question = LimbQuestion.of(lost_limbs(pipeline, body, person, person), TrackingConfig())
+    late = Late()
+    limbs = LateLimbs(late)
+    limbs.begin(wait=False)
+    for track in range(MOST_FAILURES):
+        assert not limbs.waits
+        limbs.ask(track, question)
+        late.fail()
+        with pytest.raises(MemoryError):
+            limbs.take(track)
+    assert limbs.waits
