@@ -53,6 +53,7 @@ def run(argv: list[str]) -> int:
     present = SINGLE_FRAME if options.what == 'frames' else TRACKED
     learned_from = collect(make(witness, options.seed, options.learn), console, 'to learn from')
     checked_on = collect(make(witness, CHECK_SEED, options.check), console, 'to check on')
+    console.print('Learning: a minute or two ...')
     learned = learn(learned_from, present)
     console.print(f'Learned from {len(learned_from.truth) // 24} bodies:')
     for name in Calibration.__slots__:
