@@ -10,7 +10,6 @@ import time
 from pathlib import Path
 
 TICKS = os.sysconf('SC_CLK_TCK')
-PAGE = os.sysconf('SC_PAGE_SIZE')
 STOP_S = 30.0
 
 
@@ -38,13 +37,15 @@ class WatchedNode:
 
     @property
     def memory_mb(self) -> float:
-        """Return the resident memory of the node and of the process that it starts [MB]."""
-        return sum(
-            int((files / 'statm').read_text().split()[1]) * PAGE / 1e6 for files in self._files())
+        """Return the memory of the node and of the processes that it starts [MB].
+
+        Pages that they share are counted once (Linux's proportional set size).
+        """
+        return sum(_proportional_kb(files) for files in self._files()) / 1e3
 
     @property
     def cpu_s(self) -> float:
-        """Return the processor time that both have used so far [s]."""
+        """Return the processor time that all have used so far [s]."""
         used = 0
         for files in self._files():
             fields = (files / 'stat').read_text().rsplit(')', 1)[1].split()
@@ -53,7 +54,7 @@ class WatchedNode:
 
     def _files(self) -> list[Path]:
         node = Path('/proc') / str(self._process.pid)
-        # Any of the node's threads may have started the other process.
+        # Any of the node's threads may have started the other processes.
         started = [(task / 'children').read_text().split() for task in node.glob('task/*')]
         return [node, *(node.parent / pid for pids in started for pid in pids)]
 
@@ -68,3 +69,9 @@ class WatchedNode:
             self._process.kill()
             code = self._process.wait()
         return code, time.monotonic() - started_s
+
+
+def _proportional_kb(process: Path) -> int:
+    line = next(line for line in (process / 'smaps_rollup').read_text().splitlines()
+                if line.startswith('Pss:'))
+    return int(line.split()[1])
