@@ -74,8 +74,8 @@ def parse(argv: list[str]) -> argparse.Namespace:
     parser.add_argument('--seed', type=int, default=LEARN_SEED, help='seed of the first to learn')
     options = parser.parse_args(argv)
     usual = (400, 300) if options.what == 'frames' else (4, 2)
-    options.learn = options.learn or usual[0]
-    options.check = options.check or usual[1]
+    options.learn = usual[0] if options.learn is None else options.learn
+    options.check = usual[1] if options.check is None else options.check
     return options
 
 

@@ -72,6 +72,6 @@ class WatchedNode:
 
 
 def _proportional_kb(process: Path) -> int:
-    line = next(line for line in (process / 'smaps_rollup').read_text().splitlines()
-                if line.startswith('Pss:'))
-    return int(line.split()[1])
+    lines = (process / 'smaps_rollup').read_text().splitlines()
+    # A process that ends has no memory left to tell of.
+    return sum(int(line.split()[1]) for line in lines if line.startswith('Pss:'))

@@ -35,9 +35,9 @@ def is_doubtful(track: PersonTrack, gap: Gap) -> bool:
     if gap.is_of_slow_camera:
         return True
     if track.tries > 0:
-        wait_s = min(FIRST_WAIT_S * 2.0 ** (track.tries - 1), LONGEST_WAIT_S)
+        wait_s = _doubled(FIRST_WAIT_S, track.tries - 1, LONGEST_WAIT_S)
         return track.doubts > 0 and _restarted_ago_s(track) > wait_s
-    wait_s = min(RESTART_EVERY_S * 2.0**track.rivals_beaten, RAREST_RESTART_S)
+    wait_s = _doubled(RESTART_EVERY_S, track.rivals_beaten, RAREST_RESTART_S)
     return track.doubts >= MOST_DOUBTS and _restarted_ago_s(track) > wait_s
 
 
@@ -79,6 +79,11 @@ def count_misses(track: PersonTrack, was_detected: bool) -> None:
     clear = (track.joint_state[SHARED] == JointState.VISIBLE).sum() >= CLEARLY_SEEN
     if track.misses >= MOST_MISSES and (clear or not track.is_proven):
         track.state = TrackState.LOST
+
+
+def _doubled(first_s: float, times: int, longest_s: float) -> float:
+    """Return a wait that doubles with every time, up to the longest."""
+    return min(first_s * 2.0 ** min(times, 16), longest_s)
 
 
 def _restarted_ago_s(track: PersonTrack) -> float:

@@ -139,6 +139,7 @@ class Follower:
     def begin(self, track: PersonTrack, found: FoundBody) -> None:
         """Keep the other explanations of a fresh fit while they may be true."""
         track.restarted_ns, track.evidence = track.now_ns, found.evidence
+        track.rivals_beaten = 0
         track.doubts, track.is_doubtful = 0, False
         track.alternatives = [
             Alternative(first_state(other, found.hessian), 0.0, track.now_ns)
@@ -154,8 +155,11 @@ class Follower:
         if lifted is not None:
             fit = self._without_lost_limbs(track, fit, observation, lifted)
         if track.alternatives:
-            fit = follow_alternatives(
+            best = follow_alternatives(
                 self.warm, track, fit, observation, self.config, detected=detected)
+            if best is not fit:
+                self.late_limbs.forget(track.id)
+            return best
         return fit
 
     def _better(
@@ -163,7 +167,7 @@ class Follower:
     ) -> WarmFit:
         """Return the better of what was followed and what was found anew."""
         assert rival.person.body is not None
-        seen = rival.person.body.evidence
+        seen, was_doubted = rival.person.body.evidence, track.doubts > 0
         if not has_outgrown_evidence(track, seen):
             # What was compared for new evidence only puts off nothing that doubts ask for.
             track.restarted_ns, track.doubts = track.now_ns, 0
@@ -174,7 +178,7 @@ class Follower:
         # Keypoints of one frame err together: who was followed well is believed more than them.
         if theirs >= ours - (BETTER if track.tries > 0 else MUCH_BETTER):
             track.tries += track.tries > 0
-            track.rivals_beaten += 1
+            track.rivals_beaten += was_doubted
             return fit
         track.restarted_ns, track.doubts = track.now_ns, 0
         track.tries += 1
@@ -205,6 +209,7 @@ class Follower:
             if lost.any_awake:
                 self.late_limbs.ask(track.id, LimbQuestion.of(lost, self.config))
             return fit
+        self.late_limbs.forget(track.id)
         recovery = self.recovery.recover(lost)
         track.limb_rests.note(recovery.tried, track.now_ns)
         track.filter = recovery.belief

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -22,12 +22,16 @@ from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.pipeline import BodyPipeline
 from pop_core.tracking.background import Background
 from pop_core.tracking.body_filter import FilterState
-from pop_core.tracking.limb_recovery import LimbRecovery, LostLimbs, Tried
+from pop_core.tracking.limb_recovery import LimbRecovery, LostLimbs
+from pop_core.tracking.limb_rest import Tried
+from pop_core.tracking.motion import SPEED
 from pop_core.tracking.tracking_config import TrackingConfig
 from pop_core.tracking.warm_start import FollowedBody, SeenBody, WarmStart
 
 LATE_RAD = 0.3  # how far a limb may have turned while it was looked for
-MOST_FAILURES = 3  # each costs a frame; where no help is to be had, frames wait instead
+LATEST_S = 0.5  # what was found longer ago is no longer there
+# One after the other, each of which costs a frame; where no help is to be had, frames wait.
+MOST_FAILURES = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +72,19 @@ class LimbQuestion:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Asked:
+    """A search that somebody asked for.
+
+    Args:
+        stamp_ns: Stamp of the frame.
+        future: What will become of it.
+    """
+
+    stamp_ns: int
+    future: Future[LimbAnswer]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class LimbAnswer:
     """What became of the limbs that were looked for.
 
@@ -96,12 +113,17 @@ def with_found_limbs(belief: FilterState, answer: LimbAnswer) -> FilterState:
         found |= limb & is_found
     pose = np.where(found[1:, None], answer.body_pose, belief.parameters.body_pose)
     turns = 3 + np.flatnonzero(np.repeat(found, 3))
-    covariance, velocity = belief.covariance.copy(), belief.velocity.copy()
+    covariance = belief.covariance.copy()
     covariance[turns, turns] += LATE_RAD**2
-    velocity[turns] = 0.0  # it was that of another place
-    return replace(
-        belief, parameters=belief.parameters.replaced(body_pose=pose), velocity=velocity,
-        covariance=covariance)
+    # The speeds were those of another place.
+    velocity, mixed = belief.velocity.copy(), belief.mixed.copy()
+    velocity_covariance = belief.velocity_covariance.copy()
+    velocity[turns], mixed[:, turns] = 0.0, 0.0
+    velocity_covariance[turns], velocity_covariance[:, turns] = 0.0, 0.0
+    velocity_covariance[turns, turns] = SPEED[turns] ** 2
+    return FilterState(
+        belief.parameters.replaced(body_pose=pose), velocity, covariance, mixed,
+        velocity_covariance)
 
 
 class LateLimbs:
@@ -110,41 +132,54 @@ class LateLimbs:
     def __init__(self, background: Background | None = None) -> None:
         """Have searches made meanwhile; None has everybody wait for them."""
         self._background = background
-        self._asked: dict[int, Future[LimbAnswer]] = {}
-        self._waits, self._failures = True, 0
+        self._asked: dict[int, Asked] = {}
+        self._ready: dict[int, tuple[int, LimbAnswer]] = {}
+        self._now_ns = 0
+        self._has_time, self._failures = True, 0
 
-    def begin(self, *, wait: bool) -> None:
-        """Begin a frame; `wait` where there is time to wait for searches."""
-        self._waits = wait
+    def begin(self, now_ns: int, *, has_time: bool) -> None:
+        """Begin a frame with the answers that are ready for it: none becomes so within one.
+
+        Args:
+            now_ns: Its stamp.
+            has_time: Whether there is time to wait for searches.
+
+        Raises:
+            Exception: Whatever ended a search; the next frame begins with the other answers.
+        """
+        self._now_ns, self._has_time = now_ns, has_time
+        for track, asked in list(self._asked.items()):
+            if asked.future.done():
+                del self._asked[track]
+                self._failures += 1
+                self._ready[track] = asked.stamp_ns, asked.future.result()
+                self._failures = 0
 
     @property
     def waits(self) -> bool:
         """Return whether limbs are to be looked for in the frame itself."""
         return (
-            self._waits or self._background is None or self._failures >= MOST_FAILURES)
+            self._has_time or self._background is None or self._failures >= MOST_FAILURES)
 
     def ask(self, track: int, question: LimbQuestion) -> None:
         """Have the limbs of a track looked for, unless they already are."""
         if self._background is not None and track not in self._asked:
-            self._asked[track] = self._background.submit(find_limbs, question)
+            future = self._background.submit(find_limbs, question)
+            self._asked[track] = Asked(self._now_ns, future)
 
     def take(self, track: int) -> LimbAnswer | None:
-        """Return what became of the limbs of a track once that is known.
-
-        Raises:
-            Exception: Whatever ended the search.
-        """
-        asked = self._asked.get(track)
-        if asked is None or not asked.done():
-            return None
-        del self._asked[track]
-        self._failures += asked.exception() is not None
-        return asked.result()
+        """Return what became of the limbs of a track, once."""
+        stamp_ns, answer = self._ready.pop(track, (0, None))
+        return answer if self._now_ns - stamp_ns <= LATEST_S * 1e9 else None
 
     def forget(self, track: int) -> None:
-        """Forget a search: the body has been replaced meanwhile."""
-        self._asked.pop(track, None)
+        """Forget a search: limbs were found otherwise, or the body has been replaced."""
+        self._ready.pop(track, None)
+        asked = self._asked.pop(track, None)
+        if asked is not None:
+            asked.future.cancel()
 
     def forget_unless(self, tracks: Collection[int]) -> None:
         """Forget the searches for those who are no longer followed."""
-        self._asked = {track: asked for track, asked in self._asked.items() if track in tracks}
+        for track in {*self._asked, *self._ready} - set(tracks):
+            self.forget(track)

@@ -12,6 +12,7 @@ from pop_core.fitting.observation import Observation
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.tracking.body_filter import FilterState
 from pop_core.tracking.limb_claims import limbs_of, open_shares
+from pop_core.tracking.limb_rest import Tried
 from pop_core.tracking.limb_search import LimbSearch
 from pop_core.tracking.limbs import contradicted_joints, limbs_in_the_open, loosened, lost_limbs
 from pop_core.tracking.rivals import costs, costs_over
@@ -21,7 +22,6 @@ LESS_OPEN = 0.1  # share of a limb, by which a better place for it shows through
 RESOLVED = 8.0  # cost that a body may be worse by for each joint that agrees with it instead
 
 Joints = Bool[np.ndarray, '24']
-Tried = tuple[Joints, bool]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, Int
 
 from pop_core.body.joints import N_JOINTS
 
+Tried = tuple[Bool[np.ndarray, '24'], bool]  # joints of a limb, and whether it was found
 FIRST_REST_S, LONGEST_REST_S = 0.1, 0.8
 
 
@@ -41,7 +42,7 @@ class LimbRests:
         """Return the joints that are not looked for."""
         return self.until_ns > now_ns
 
-    def note(self, tried: Iterable[tuple[Bool[np.ndarray, '24'], bool]], now_ns: int) -> None:
+    def note(self, tried: Iterable[Tried], now_ns: int) -> None:
         """Note which limbs were looked for, in order, and whether each was found."""
         for limb, is_found in tried:
             if is_found:

@@ -102,7 +102,7 @@ class BodyTracker:
         self._gap = Gap(
             np.inf if self._last is None else (frame.stamp_ns - self._last[1]) * 1e-9, skipped)
         self._last = frame.camera, frame.stamp_ns
-        self._late_limbs.begin(wait=self._gap.is_of_slow_camera)
+        self._late_limbs.begin(frame.stamp_ns, has_time=self._gap.is_of_slow_camera)
         with watch.step('undistort'):
             seen = undistort_frame(frame)
         is_late = self._fresh.poll()

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.lost_limb import lost_limbs, raised
 from support.node import ROOT
 from support.one_person import facing_person
 from support.stage import Stage
@@ -22,6 +23,8 @@ from pop_core.estimate import EstimateStatus
 from pop_core.keypoints.detection import Detection
 from pop_core.pipeline import Scene
 from pop_core.tracking.finder import find_person
+from pop_core.tracking.late_limbs import LimbQuestion, find_limbs
+from pop_core.tracking.tracking_config import TrackingConfig
 from pop_ros import finding_process
 from pop_ros.finding_process import FindingError, FindingProcess
 
@@ -71,6 +74,18 @@ def test_it_finds_whom_the_node_itself_would_find_with_the_settings_of_the_momen
     np.testing.assert_array_equal(there.body.hessian, here.body.hessian)
     finding.configure(PipelineConfig(max_range_m=1.0))
     assert finding.submit(find_person, *seen).result(WAIT_S).status is EstimateStatus.TOO_FAR
+
+
+def test_limbs_looked_for_there_are_those_found_here(
+    finding: FindingProcess, stage: Stage
+) -> None:
+    person, pipeline = facing_person(np.zeros(10)), stage.tracker.pipeline
+    lost = lost_limbs(pipeline, stage.body, raised(person, -0.9), person)
+    question = LimbQuestion.of(lost, TrackingConfig())
+    there = finding.submit(find_limbs, question).result(WAIT_S)
+    here = find_limbs(pipeline, question)
+    np.testing.assert_array_equal(there.body_pose, here.body_pose)
+    assert [is_found for _, is_found in there.tried] == [True]
 
 
 def test_an_error_there_is_an_error_here_and_a_dead_process_is_replaced(

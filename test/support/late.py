@@ -23,11 +23,13 @@ class Late:
     def finish(self) -> None:
         """Finish what waits."""
         for future, work, inputs in self.waiting:
-            future.set_result(work(self.pipeline, *inputs))
+            if future.set_running_or_notify_cancel():
+                future.set_result(work(self.pipeline, *inputs))
         self.waiting.clear()
 
     def fail(self) -> None:
         """Fail to do what waits."""
         for future, *_ in self.waiting:
-            future.set_exception(MemoryError())
+            if future.set_running_or_notify_cancel():
+                future.set_exception(MemoryError())
         self.waiting.clear()

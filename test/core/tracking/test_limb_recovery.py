@@ -5,29 +5,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.late import Late
-from support.one_person import lift_truth, photograph
+from support.lost_limb import NOBODY_RESTS, lost_limbs, raised
 from support.stage import Scripted
 
-from pop_core.body.joints import JOINT_INDEX
 from pop_core.body.kinematics import joints
 from pop_core.body.model import BodyModel, BodyParameters
-from pop_core.fitting.observation import observe
 from pop_core.pipeline import BodyPipeline
 from pop_core.retrieval.default_library import default_library
-from pop_core.tracking.body_filter import first_state
 from pop_core.tracking.late_limbs import (
+    LATEST_S,
     MOST_FAILURES,
     LateLimbs,
     LimbQuestion,
     find_limbs,
     with_found_limbs,
 )
-from pop_core.tracking.limb_recovery import LimbRecovery, LostLimbs
+from pop_core.tracking.limb_recovery import LimbRecovery
 from pop_core.tracking.limbs import contradicted_joints
 from pop_core.tracking.tracking_config import TrackingConfig
 from pop_core.tracking.warm_start import WarmStart
 
-NOBODY_RESTS = np.zeros(24, dtype=bool)
+FRAME_NS = 33_000_000
 
 
 @pytest.fixture(scope='module')
@@ -39,25 +37,6 @@ def pipeline(body: BodyModel) -> BodyPipeline:
 def recovery(pipeline: BodyPipeline) -> LimbRecovery:
     config = TrackingConfig()
     return LimbRecovery(WarmStart(pipeline.fitter, config.prior_weight), config.steps)
-
-
-def raised(person: BodyParameters, radians: float) -> BodyParameters:
-    """Return a person whose left arm hangs differently."""
-    pose = person.body_pose.copy()
-    pose[JOINT_INDEX['left_shoulder'] - 1, 2] += radians
-    return person.replaced(body_pose=pose)
-
-
-def lost_limbs(
-    pipeline: BodyPipeline, body: BodyModel, seen: BodyParameters, believed: BodyParameters
-) -> LostLimbs:
-    """Return a fit that began, and stayed, where a person is believed to be."""
-    frame, lifted = photograph(body, seen), lift_truth(body, seen)
-    observation = observe(frame, lifted, np.zeros(frame.depth_m.shape, dtype=bool))
-    belief = first_state(believed, 1e6 * np.eye(pipeline.fitter.coarse.size))
-    warm = WarmStart(pipeline.fitter, TrackingConfig().prior_weight)
-    fit = warm.fit(belief, observation, 1, detected=False)
-    return LostLimbs(belief, fit, observation, lifted, NOBODY_RESTS)
 
 
 def test_a_limb_in_its_place_is_worth_a_fit(
@@ -112,17 +91,56 @@ def test_a_limb_found_elsewhere_is_the_one_found_here_and_only_it_is_moved(
     assert grown.sum() == 3 * limb.sum()
 
 
-def test_where_searches_fail_again_and_again_frames_wait_for_them_instead(
-    pipeline: BodyPipeline, body: BodyModel, person: BodyParameters
+@pytest.fixture
+def question(pipeline: BodyPipeline, body: BodyModel, person: BodyParameters) -> LimbQuestion:
+    return LimbQuestion.of(lost_limbs(pipeline, body, person, person), TrackingConfig())
+
+
+@pytest.fixture
+def late(pipeline: BodyPipeline) -> Late:
+    made = Late()
+    made.pipeline = pipeline
+    return made
+
+
+def test_where_searches_fail_one_after_the_other_frames_wait_for_them_instead(
+    late: Late, question: LimbQuestion
 ) -> None:
-    question = LimbQuestion.of(lost_limbs(pipeline, body, person, person), TrackingConfig())
-    late = Late()
-    limbs = LateLimbs(late)
-    limbs.begin(wait=False)
-    for track in range(MOST_FAILURES):
+    limbs, now_ns = LateLimbs(late), 0
+
+    def fail() -> None:
+        nonlocal now_ns
         assert not limbs.waits
-        limbs.ask(track, question)
+        limbs.ask(0, question)
         late.fail()
+        now_ns += FRAME_NS
         with pytest.raises(MemoryError):
-            limbs.take(track)
+            limbs.begin(now_ns, has_time=False)
+
+    limbs.begin(now_ns, has_time=False)
+    for _ in range(MOST_FAILURES - 1):
+        fail()
+    limbs.ask(0, question)
+    late.finish()
+    limbs.begin(now_ns + FRAME_NS, has_time=False)
+    assert limbs.take(0) is not None
+    for _ in range(MOST_FAILURES):
+        fail()
     assert limbs.waits
+
+
+def test_what_was_found_long_ago_or_for_another_body_is_not_taken(
+    late: Late, question: LimbQuestion
+) -> None:
+    limbs = LateLimbs(late)
+    limbs.begin(0, has_time=False)
+    for track in range(4):
+        limbs.ask(track, question)
+    limbs.forget(0)
+    limbs.forget_unless({2, 3})
+    late.finish()
+    limbs.begin(FRAME_NS, has_time=False)
+    assert [limbs.take(track) is not None for track in range(3)] == [False, False, True]
+    assert limbs.take(2) is None
+    limbs.begin(round(LATEST_S * 1e9) + FRAME_NS, has_time=False)
+    assert limbs.take(3) is None
