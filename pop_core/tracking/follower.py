@@ -34,12 +34,7 @@ from pop_core.tracking.limb_rest import LimbRests
 from pop_core.tracking.limbs import contradicted_joints
 from pop_core.tracking.liveliness import followed_trail, liveliness
 from pop_core.tracking.motion import N_MOVING
-from pop_core.tracking.rivals import (
-    BETTER,
-    MUCH_BETTER,
-    costs,
-    follow_alternatives,
-)
+from pop_core.tracking.rivals import costs, follow_alternatives, lead
 from pop_core.tracking.sides import misnamed_joints, without_joints
 from pop_core.tracking.track import Alternative, PersonTrack
 from pop_core.tracking.track_view import observe_track
@@ -175,8 +170,7 @@ class Follower:
         belief = self._found_anew(track, rival, observation.lifted)
         other = self.warm.fit(belief, observation, self.config.steps, detected=True)
         ours, theirs = costs(self.warm.fitter, [fit, other], observation)
-        # Keypoints of one frame err together: who was followed well is believed more than them.
-        if theirs >= ours - (BETTER if track.tries > 0 else MUCH_BETTER):
+        if theirs >= ours - lead(track, rival.stamp_ns):
             track.tries += track.tries > 0
             track.rivals_beaten += was_doubted
             return fit

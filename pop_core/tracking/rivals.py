@@ -12,6 +12,7 @@ from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.energy import PriorBelief
 from pop_core.fitting.hypotheses import Hypothesis
 from pop_core.fitting.observation import Observation
+from pop_core.tracking.detection_schedule import LONG_GAP_S
 from pop_core.tracking.track import PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
 from pop_core.tracking.warm_start import FollowedBody, WarmFit, WarmStart, updated
@@ -46,6 +47,21 @@ def costs_over(
         for body in bodies]
     fitter.steps.score(hypotheses, observation, segment)
     return [hypothesis.cost for hypothesis in hypotheses]
+
+
+def lead(track: PersonTrack, stamp_ns: int) -> float:
+    """Return the cost by which a body that was found anew must be better to take over.
+
+    Keypoints of one frame err together: who was followed well is believed more than them. Between
+    the frames of a slow camera arms move far, and what is found in a frame is worth as much.
+
+    Args:
+        track: The person.
+        stamp_ns: Stamp of the frame that the body was found in.
+    """
+    if track.gap_s > LONG_GAP_S and stamp_ns == track.now_ns:
+        return 0.0
+    return BETTER if track.tries > 0 else MUCH_BETTER
 
 
 def distance_m(state: BodyState, other: BodyState) -> float:

@@ -10,10 +10,11 @@ from support.stage import RATE_HZ, Stage, only
 from pop_core.body.joints import SHARED_INDEX
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.estimate import EstimateStatus, JointState, TrackState
-from pop_core.tracking.detection_schedule import DetectionSchedule, Gap
+from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, Gap
 from pop_core.tracking.doubts import count_misses, has_outgrown_evidence, is_doubtful, may_be
 from pop_core.tracking.finder import FoundPerson
 from pop_core.tracking.fresh_fits import FreshFit
+from pop_core.tracking.rivals import lead
 from pop_core.tracking.track import PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
 
@@ -63,6 +64,18 @@ def test_who_is_followed_well_is_looked_for_ever_more_rarely_while_nothing_bette
         waits.append(first_doubtful_s(track))
     assert (np.diff(waits[:3]) > 0).all()
     assert waits[3] == pytest.approx(waits[2])
+
+
+def test_only_a_body_found_in_the_present_frame_of_a_slow_camera_needs_no_lead(
+    track: PersonTrack
+) -> None:
+    leads = []
+    for track.tries in (0, 1):
+        leads.append(lead(track, track.now_ns))
+    assert leads[0] > leads[1] > 0.0
+    track.gap_s = 2 * LONG_GAP_S
+    assert lead(track, track.now_ns) == 0.0
+    assert lead(track, track.now_ns - FRAME_NS) == leads[1]
 
 
 def test_looks_prove_a_body(followed: Stage, track: PersonTrack) -> None:
