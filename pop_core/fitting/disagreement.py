@@ -14,10 +14,9 @@ from pop_core.keypoints.lifted_joints import LiftedJoints
 
 AGREES_M = 0.12  # a keypoint farther from the body than this does not confirm its joint
 # The keypoint that a limb's joint is confirmed by; hands and feet have none of their own.
-NAMED_BY = {
-    'elbow': 'elbow', 'wrist': 'wrist', 'hand': 'wrist', 'knee': 'knee', 'ankle': 'ankle',
-    'foot': 'ankle',
-}
+ARM = {'elbow': 'elbow', 'wrist': 'wrist', 'hand': 'wrist'}
+LEG = {'knee': 'knee', 'ankle': 'ankle', 'foot': 'ankle'}
+NAMED_BY = ARM | LEG
 
 
 def _limb_joints() -> tuple[list[int], list[int]]:

@@ -20,13 +20,14 @@ from pop_core.body.joints import JOINT_NAMES
 from pop_core.body.kinematics import joints_jacobian, pose_skeleton
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.fitting.body_fit import BodyFit
+from pop_core.fitting.disagreement import ARM, LEG
 
 # Widest factor of standard deviations by misfit and strain together: beyond what was learned from.
 MOST_WIDENING = 4.0
 TYPICAL_M = 0.03  # standard deviation by the curvature of a joint like most
-ARM, LEG = ('elbow', 'wrist', 'hand'), ('knee', 'ankle', 'foot')
 PART_OF_JOINT = np.array([
-    1 if name.endswith(ARM) else 2 if name.endswith(LEG) else 0 for name in JOINT_NAMES])
+    1 if name.endswith(tuple(ARM)) else 2 if name.endswith(tuple(LEG)) else 0
+    for name in JOINT_NAMES])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

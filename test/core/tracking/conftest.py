@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.late import Late
 from support.one_person import facing_person
 
 from pop_core.body.default_body import default_body
@@ -16,3 +17,8 @@ def body() -> BodyModel:
 @pytest.fixture(scope='session')
 def person() -> BodyParameters:
     return facing_person(np.zeros(10))
+
+
+@pytest.fixture
+def late() -> Late:
+    return Late()

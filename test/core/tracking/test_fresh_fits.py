@@ -27,11 +27,6 @@ def newcomer(person: BodyParameters, step: int) -> BodyParameters:
 
 
 @pytest.fixture
-def late() -> Late:
-    return Late()
-
-
-@pytest.fixture
 def stage(body: BodyModel, late: Late) -> Stage:
     made = Stage(body, finding=late)
     late.pipeline = made.tracker.pipeline

@@ -13,11 +13,6 @@ WRIST = JOINT_INDEX['left_wrist']
 
 
 @pytest.fixture
-def late() -> Late:
-    return Late()
-
-
-@pytest.fixture
 def stage(body: BodyModel, late: Late) -> Stage:
     made = Stage(body, searching=late)
     late.pipeline = made.tracker.pipeline

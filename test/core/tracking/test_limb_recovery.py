@@ -96,16 +96,10 @@ def question(pipeline: BodyPipeline, body: BodyModel, person: BodyParameters) ->
     return LimbQuestion.of(lost_limbs(pipeline, body, person, person), TrackingConfig())
 
 
-@pytest.fixture
-def late(pipeline: BodyPipeline) -> Late:
-    made = Late()
-    made.pipeline = pipeline
-    return made
-
-
 def test_where_searches_fail_one_after_the_other_frames_wait_for_them_instead(
-    late: Late, question: LimbQuestion
+    pipeline: BodyPipeline, late: Late, question: LimbQuestion
 ) -> None:
+    late.pipeline = pipeline
     limbs, now_ns = LateLimbs(late), 0
 
     def fail() -> None:
@@ -130,8 +124,9 @@ def test_where_searches_fail_one_after_the_other_frames_wait_for_them_instead(
 
 
 def test_what_was_found_long_ago_or_for_another_body_is_not_taken(
-    late: Late, question: LimbQuestion
+    pipeline: BodyPipeline, late: Late, question: LimbQuestion
 ) -> None:
+    late.pipeline = pipeline
     limbs = LateLimbs(late)
     limbs.begin(0, has_time=False)
     for track in range(4):
