@@ -11,28 +11,28 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 
 from pop_core.geometry.camera import Camera
+from pop_core.keypoints.canonical_depth_kernels import read_depth
 
 STRIDE = 4  # canonical pixels per cell of the network's output
 SIDE_MULTIPLE = 32
 LARGEST_SIDE = 1024  # wider views than this many canonical pixels are cut at the sides
-NEIGHBOURS = ((0, 0), (0, 1), (1, 0), (0, -1), (-1, 0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CanonicalView:
-    """The pinhole of the network's input, and where its pixels and the camera's meet.
+    """The pinhole of a network's input, and where its pixels lie in the measured image.
 
     Args:
         camera: Pinhole with sides divisible by 32.
         source_v: Row of the measured image per canonical pixel, -1 outside.
         source_u: Column of it.
-        cell: Flat index of the network's output cell per measured pixel.
+        rays: (x/z, y/z) of each measured pixel.
     """
 
     camera: Camera
     source_v: Int[np.ndarray, 'H W']
     source_u: Int[np.ndarray, 'H W']
-    cell: Int[np.ndarray, 'h w']
+    rays: Float32[np.ndarray, 'h w 2']
 
 
 def canonical_view(camera: Camera, focal_px: float) -> CanonicalView:
@@ -54,11 +54,9 @@ def canonical_view(camera: Camera, focal_px: float) -> CanonicalView:
     nearest = np.rint(np.nan_to_num(uv, nan=-1.0)).astype(np.int64)
     inside = ((nearest >= 0) & (nearest < [camera.width, camera.height])).all(axis=1)
     nearest[~inside] = -1
-    pixel = np.rint(np.nan_to_num(rays * focal_px + [cx, cy])).astype(np.int64)
-    column, row = np.clip(pixel, 0, [width - 1, height - 1]).transpose(2, 0, 1) // STRIDE
     return CanonicalView(
         view, nearest[:, 1].reshape(height, width), nearest[:, 0].reshape(height, width),
-        row * (width // STRIDE) + column)
+        rays.astype(np.float32))
 
 
 def canonical_depth(
@@ -69,15 +67,10 @@ def canonical_depth(
     A pixel is read, not averaged: means of near and far are nowhere. Where it is missing, the
     next one beside it is taken.
     """
-    out = np.zeros(view.source_v.shape, dtype=np.float32)
-    h, w = depth_m.shape
-    inside = view.source_v >= 0
-    for dv, du in NEIGHBOURS:
-        missing = inside & (out == 0)
-        v = np.clip(view.source_v[missing] + dv, 0, h - 1)
-        u = np.clip(view.source_u[missing] + du, 0, w - 1)
-        out[missing] = np.nan_to_num(depth_m[v, u], nan=0.0, posinf=0.0, neginf=0.0)
-    return np.maximum(out, 0.0)
+    out = np.empty(view.source_v.shape, dtype=np.float32)
+    rows, columns = (np.arange(size) for size in view.source_v.shape)
+    read_depth(depth_m, view.source_v, view.source_u, rows, columns, 0.0, 0.0, out)
+    return out
 
 
 def _extreme(

@@ -1,39 +1,33 @@
 """The embedded detector: people from the depth image alone, also in the dark.
 
-Colours are never looked at. A small network says of every 4x4 pixels of a canonical view which
-body part they show and where the joints of that person are; cells that agree are one person.
+Colours are never looked at. A small network says of every 4x4 pixels of a view which body part
+they show and where the joints of that person are; cells that agree are one person. The first view
+shows the whole image and finds who is where, then each of them is looked at from near.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
-from jaxtyping import Float32, Int8
+from jaxtyping import Float, Float32
 
 from pop_core.errors import NetworkShapeError
 from pop_core.geometry.camera import Camera
-from pop_core.keypoints.body_parts import BACKGROUND, N_CLASSES
-from pop_core.keypoints.canonical_depth import (
-    STRIDE,
-    CanonicalView,
-    canonical_depth,
-    canonical_view,
-)
-from pop_core.keypoints.depth_masks import label_pixels
-from pop_core.keypoints.depth_votes import (
-    Cells,
-    DepthNetConfig,
-    VotedPerson,
-    fuse_votes,
-    group_cells,
-    read_votes,
-)
+from pop_core.keypoints.body_parts import N_CLASSES
+from pop_core.keypoints.canonical_depth import CanonicalView, canonical_depth, canonical_view
+from pop_core.keypoints.close_view import FINEST, NetworkView, close_depth, close_view
+from pop_core.keypoints.depth_grouping import group_cells, nearest_trunk
+from pop_core.keypoints.depth_masks import PixelLabels, label_pixels, no_labels
+from pop_core.keypoints.depth_votes import Cells, DepthNetConfig, read_cells
 from pop_core.keypoints.detection import Detection
+from pop_core.keypoints.joint_surface import joints_with_skin
 from pop_core.keypoints.network import Tensor
 from pop_core.keypoints.onnx_session import OnnxSession, load_network
+from pop_core.keypoints.vote_fusion import VotedPerson, fuse_votes
 from pop_core.rgbd import RgbdFrame
 
 EMBEDDED = Path(__file__).parents[1] / 'data' / 'depth_net.onnx'
@@ -42,8 +36,32 @@ OUTPUTS = (('parts', N_CLASSES), ('votes', 45), ('log_sigma', 15), ('visible', 1
 EXPECTED = ('a depth network of this package: depth_m (1, 1, ?, ?) float32 -> '
             + ', '.join(f'{name} (1, {channels}, ?, ?)' for name, channels in OUTPUTS))
 FEWEST_CELLS = 4
-SUREST = 8  # joints; those that are hidden or out of the image make nobody less real
+MOST_LOOKS = 32  # an image of nothing but noise must not take seconds
+BOX_SCORE = 0.3  # of joints whose pixels a person's box holds: thin limbs may lack in the mask
 FOCAL_PX = (40.0, 1000.0)  # no network of this kind looks finer or coarser
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Views:
+    """What is computed once per camera: the view of the whole image, and a fine one."""
+
+    camera: Camera
+    whole: CanonicalView
+    fine: CanonicalView
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """One person, the cells that show them, and the view that these are of."""
+
+    person: VotedPerson
+    cells: Cells
+    view: NetworkView
+
+    @property
+    def trunk(self) -> Float[np.ndarray, '3']:
+        """Return the middle of the person's trunk [m]."""
+        return self.person.trunk
 
 
 class DepthNetDetector:
@@ -62,7 +80,7 @@ class DepthNetDetector:
         self.config = config or DepthNetConfig()
         self.focal_px = _focal(session)
         self._session = session
-        self._view: tuple[tuple[object, ...], CanonicalView] | None = None
+        self._views: Views | None = None
 
     @property
     def reason(self) -> str:
@@ -72,21 +90,60 @@ class DepthNetDetector:
 
     def detect(self, frame: RgbdFrame) -> list[Detection]:
         """Return the people of a frame, best first."""
-        view = self.view(frame.camera)
-        depth_m = canonical_depth(frame.depth_m, view)
-        return decode(self.run(depth_m), depth_m, view, frame, self.config)
+        first = self.first_look(frame)
+        closer = [self.closer(frame, first, k) for k in range(len(first))]
+        people = distinct([look for look in closer if look is not None], self.config)
+        labels = no_labels(frame.depth_m.shape)
+        rays = self.views(frame.camera).whole.rays
+        for index, look in enumerate(people):
+            label_pixels(labels, index, look.cells, look.view, frame, rays)
+        found = [_detection(look.person, k, labels, frame) for k, look in enumerate(people)]
+        return sorted((d for d in found if d is not None), key=lambda d: -d.score)
+
+    def first_look(self, frame: RgbdFrame) -> list[Look]:
+        """Return everybody who may be in a frame, the largest first."""
+        canonical = self.views(frame.camera).whole
+        depth_m, view = canonical_depth(frame.depth_m, canonical), NetworkView(canonical.camera)
+        cells = self.cells(depth_m, view)
+        if len(cells) < FEWEST_CELLS:
+            return []
+        member = group_cells(cells, self.config)
+        groups = [cells.chosen(member == k) for k in range(member.max() + 1)]
+        looks = [Look(fuse_votes(group), group, view) for group in groups]
+        return [look for look in looks if np.isfinite(look.person.joints).all()
+                and look.person.score >= self.config.min_candidate_score][:MOST_LOOKS]
+
+    def closer(self, frame: RgbdFrame, looks: Sequence[Look], index: int) -> Look | None:
+        """Return what a near view says of one of the people; None when it shows nobody there.
+
+        Args:
+            frame: What was measured.
+            looks: Everybody who may be there: what is nearer to others is theirs.
+            index: The one to look at.
+        """
+        person, fine = looks[index].person, self.views(frame.camera).fine
+        view = close_view(self.focal_px, person.joints, person.surface_m, fine)
+        cells = self.cells(close_depth(frame.depth_m, fine, view), view)
+        trunks = np.array([look.trunk for look in looks])
+        own = cells.chosen(nearest_trunk(cells, trunks, self.config.reach_m) == index)
+        if len(own) < FEWEST_CELLS:
+            return None
+        return Look(fuse_votes(own), own, view)
+
+    def cells(self, shown_m: Float32[np.ndarray, 'h w'], view: NetworkView) -> Cells:
+        """Return what the network says of what it is shown [m]."""
+        return read_cells(self.run(shown_m), shown_m, view, self.config.min_person_probability)
 
     def run(self, depth_m: Float32[np.ndarray, 'h w']) -> Sequence[Tensor]:
-        """Return parts, votes, log sigma and visibility of a canonical depth image [m]."""
+        """Return parts, votes, log sigma and visibility of a depth image [m]."""
         return [output[0] for output in self._session.run(depth_m[None, None])]
 
-    def view(self, camera: Camera) -> CanonicalView:
-        """Return the network's view of a camera; kept while the camera stays the same."""
-        key = (camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy,
-               camera.distortion_model, camera.d.tobytes())
-        if self._view is None or self._view[0] != key:
-            self._view = (key, canonical_view(camera, self.focal_px))
-        return self._view[1]
+    def views(self, camera: Camera) -> Views:
+        """Return the views of a camera; kept while the camera stays the same."""
+        if self._views is None or not self._views.camera.sees_like(camera):
+            self._views = Views(camera, canonical_view(camera, self.focal_px),
+                                canonical_view(camera, FINEST * self.focal_px))
+        return self._views
 
 
 def load_depth_net(
@@ -105,83 +162,40 @@ def is_depth_net(session: OnnxSession) -> bool:
     return KIND in session.facts
 
 
-def decode(
-    outputs: Sequence[Tensor], depth_m: Float32[np.ndarray, 'H W'], view: CanonicalView,
-    frame: RgbdFrame, config: DepthNetConfig,
-) -> list[Detection]:
-    """Return the people that a network's outputs tell of, best first.
-
-    Args:
-        outputs: Parts, votes, log sigma and visibility.
-        depth_m: The network's input [m].
-        view: The camera of that input.
-        frame: What was measured.
-        config: Settings.
-    """
-    parts, votes, log_sigma, visible = outputs
-    rows, columns = parts.shape[1:]
-    nearest = cell_depth(depth_m)
-    probability = 1.0 - _softmax(parts)[BACKGROUND]
-    shown = (probability > config.min_person_probability) & np.isfinite(nearest)
-    row, column = np.nonzero(shown)
-    if len(row) < FEWEST_CELLS:
-        return []
-    z = nearest[row, column].astype(np.float64)
-    cells = Cells(
-        row, column, z, (z * STRIDE / view.camera.fx) ** 2,
-        probability[row, column].astype(np.float64),
-        read_votes(votes, row, column, z, view.camera),
-        np.exp(log_sigma[:, row, column].T.astype(np.float64)),
-        1.0 / (1.0 + np.exp(-visible[:, row, column].T.astype(np.float64))))
-    member = group_cells(cells, config)
-    people = [fuse_votes(cells.chosen(member == k)) for k in range(member.max() + 1)]
-    owner = np.full((rows, columns), -1, dtype=np.int64)
-    owner[row, column] = member
-    part = 1 + parts[1:].argmax(axis=0)
-    pixels = label_pixels(frame.depth_m, view, owner, part, nearest)
-    found = [_detection(person, k, pixels, frame.camera) for k, person in enumerate(people)
-             if person_score(person) >= config.min_person_score]
-    return sorted((d for d in found if d is not None), key=lambda d: -d.score)
-
-
-def cell_depth(depth_m: Float32[np.ndarray, 'h w']) -> Float32[np.ndarray, 'h4 w4']:
-    """Return the nearest depth of each cell [m], +inf where nothing was measured."""
-    h, w = depth_m.shape
-    filled = np.where(depth_m > 0, depth_m, np.float32(np.inf))
-    return filled.reshape(h // STRIDE, STRIDE, w // STRIDE, STRIDE).min(axis=(1, 3))
-
-
-def person_score(person: VotedPerson) -> float:
-    """Return a score 0..1: that there is a person, and that the surer half of joints is right."""
-    return person.existence * float(np.sort(person.certainty)[-SUREST:].mean())
+def distinct(looks: Sequence[Look], config: DepthNetConfig) -> list[Look]:
+    """Return those who are surely people, each once, best first: of one trunk the best look."""
+    kept: list[Look] = []
+    for look in sorted(looks, key=lambda look: -look.person.score):
+        apart = all(np.linalg.norm(look.trunk - other.trunk) >= config.trunk_gap_m
+                    for other in kept)
+        if apart and look.person.score >= config.min_person_score:
+            kept.append(look)
+    return kept
 
 
 def _detection(
-    person: VotedPerson, index: int,
-    pixels: tuple[Int8[np.ndarray, 'h w'], Int8[np.ndarray, 'h w']], camera: Camera,
+    person: VotedPerson, index: int, labels: PixelLabels, frame: RgbdFrame
 ) -> Detection | None:
     """Return a person in pixels; None when none of its joints or pixels lie in the image."""
-    owner, labels = pixels
-    mask = owner == index
-    uv = camera.project(person.joints)
+    camera, mask = frame.camera, labels.person == index
+    joints = joints_with_skin(person, index, labels, frame)
+    uv = camera.project(joints)
     inside = (np.nan_to_num(uv, nan=-1.0) >= 0).all(axis=1) & (
         np.nan_to_num(uv, nan=-1.0) <= [camera.width - 1, camera.height - 1]).all(axis=1)
     left, top, width, height = cv2.boundingRect(mask.view(np.uint8))
     if width == 0 or not inside.any():
         return None
+    scores = np.where(inside, person.certainty * person.existence, 0.0)
+    seen = uv[(scores > BOX_SCORE) & (person.visible > 0.5)]
+    corners = np.vstack([[left, top], [left + width - 1, top + height - 1], seen])
     return Detection(
         keypoints_px=np.where(inside[:, None], uv, np.nan),
-        scores=np.where(inside, person.certainty * person.existence, 0.0),
-        box_px=np.array([left, top, left + width - 1, top + height - 1], dtype=np.float64),
-        joint_depth_m=np.where(inside, person.joints[:, 2], np.nan),
+        scores=scores,
+        box_px=np.concatenate([corners.min(axis=0), corners.max(axis=0)]),
+        joint_depth_m=np.where(inside, joints[:, 2], np.nan),
         joint_sigma_m=np.where(inside, np.sqrt(2.0) * person.sigma_m, np.nan),
         visible=person.visible, person_mask=mask,
-        part_labels=np.where(mask, labels, np.int8(-1)))
-
-
-def _softmax(logits: Tensor) -> Tensor:
-    shifted = np.exp(logits - logits.max(axis=0, keepdims=True))
-    return np.asarray(shifted / shifted.sum(axis=0, keepdims=True))
+        part_labels=np.where(mask, labels.part, np.int8(-1)))
 
 
 def _focal(session: OnnxSession) -> float:

@@ -1,5 +1,7 @@
 """What a perfect depth network would say about a scene, cell by cell (slow and plain)."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from pop_core.keypoints.body_parts import CLASS_OF_LABEL, N_CLASSES
@@ -36,3 +38,20 @@ def truth_maps(scene, sigma_m=0.02):
             visible[:, r, c] = np.where(person.visible, SURE, -SURE)
     log_sigma = np.full((15, rows, columns), np.log(sigma_m), dtype=np.float32)
     return parts, votes, log_sigma, visible
+
+
+def shown_scene(scene, shown_m, view):
+    """Return a TrainingScene as a network sees it that is shown some view of it."""
+    shown, camera = view.camera, scene.camera
+    focal_px = shown.fx * view.enlarged
+    v, u = np.mgrid[:shown.height, :shown.width]
+    u = np.rint((u - shown.cx) / focal_px * camera.fx + camera.cx).astype(int)
+    v = np.rint((v - shown.cy) / focal_px * camera.fy + camera.cy).astype(int)
+    inside = (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height) & (shown_m > 0)
+    u, v = np.where(inside, u, 0), np.where(inside, v, 0)
+    people = [SimpleNamespace(shared_points=view.from_camera(person.shared_points),
+                              visible=person.visible) for person in scene.people]
+    return SimpleNamespace(
+        camera=shown, depth_m=np.where(shown_m > 0, shown_m, np.nan), people=people,
+        owner=np.where(inside, scene.owner[v, u], -1),
+        part_labels=np.where(inside, scene.part_labels[v, u], -1))

@@ -2,18 +2,35 @@
 
 import numpy as np
 import pytest
-from support.depth_maps import truth_maps
+from support.depth_maps import shown_scene, truth_maps
 
 from pop_core.body.default_body import default_body
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.canonical_depth import canonical_depth, canonical_view
-from pop_core.keypoints.depth_net import cell_depth, decode
-from pop_core.keypoints.depth_votes import Cells, DepthNetConfig, fuse_votes, group_cells
+from pop_core.keypoints.depth_grouping import group_cells
+from pop_core.keypoints.depth_net import EMBEDDED, DepthNetDetector
+from pop_core.keypoints.depth_votes import Cells, DepthNetConfig, cell_depth, read_cells
+from pop_core.keypoints.onnx_session import load_network
+from pop_core.keypoints.vote_fusion import fuse_votes
 from pop_core.rgbd import RgbdFrame
 from pop_core.synthesis.coarse_body import coarse_body
 from pop_core.synthesis.training_scenes import TrainingScenes
 
 VGA = Camera(640, 480, 525.0, 525.0, 319.5, 239.5)
+
+
+class PerfectDetector(DepthNetDetector):
+    """The detector, with a network that knows the scene."""
+
+    def __init__(self, scene):
+        """Take the scene."""
+        super().__init__(load_network(EMBEDDED))
+        self.scene = scene
+
+    def cells(self, shown_m, view):
+        """Return what a perfect network says of a view of the scene."""
+        maps = truth_maps(shown_scene(self.scene, shown_m, view))
+        return read_cells(maps, shown_m, view, self.config.min_person_probability)
 
 
 @pytest.fixture(scope='module')
@@ -23,14 +40,9 @@ def scenes():
 
 
 def detections(scene):
-    """Return what perfect maps of a scene are decoded into; its view is its own camera."""
-    camera = scene.camera
-    view = canonical_view(camera, camera.fx)
-    if (view.camera.width, view.camera.height) != (camera.width, camera.height):
-        raise AssertionError('scenes are drawn in the size of the network')
-    frame = RgbdFrame(np.zeros((*scene.depth_m.shape, 3), np.uint8), scene.depth_m, camera)
-    depth_m = canonical_depth(scene.depth_m, view)
-    return decode(truth_maps(scene), np.nan_to_num(depth_m), view, frame, DepthNetConfig())
+    """Return what perfect maps of a scene are decoded into."""
+    frame = RgbdFrame(np.zeros((*scene.depth_m.shape, 3), np.uint8), scene.depth_m, scene.camera)
+    return PerfectDetector(scene).detect(frame)
 
 
 def shown_people(scene, least_m2=0.06):
@@ -57,8 +69,9 @@ def test_perfect_maps_give_joints_where_they_are_hidden_ones_too(scenes):
             points = scene.camera.unproject(
                 best.keypoints_px[known], best.joint_depth_m[known])
             error = np.linalg.norm(points - person.shared_points[known], axis=1)
-            # Votes are float32, and holes filled from beside move a cell's surface.
-            assert np.median(error) < 0.03
+            # Skin draws seen joints half way to where it has them on a mean body, a few
+            # centimetres off; holes filled from beside move a cell's surface.
+            assert np.median(error) < 0.04
             np.testing.assert_array_equal(best.visible[known] > 0.5, person.visible[known])
             checked += known.sum()
     assert checked > 200
@@ -92,7 +105,7 @@ def two_trunks(gap_m, rng, area_m2=1e-3):
     joints = body + centres[:, None] + rng.normal(0, 0.01, (120, 15, 3))
     ones = np.ones((120, 15))
     return Cells(np.arange(120), np.arange(120), np.full(120, 2.9), np.full(120, area_m2),
-                 np.full(120, 0.9), joints, 0.03 * ones, 0.5 * ones)
+                 np.full(120, 0.9), np.full((120, 16), 1 / 16), joints, 0.03 * ones, 0.5 * ones)
 
 
 @pytest.mark.parametrize('gap_m', [0.45, 0.6, 1.0])
@@ -144,11 +157,7 @@ def test_canonical_pixels_and_measured_pixels_lie_on_the_same_rays(camera):
     assert inside.mean() > 0.6
     there = rays[view.source_v[inside], view.source_u[inside]]
     np.testing.assert_allclose(there, grid[inside], atol=1.0 / camera.fx)  # half a pixel, doubled
-    row, column = np.divmod(view.cell, view.camera.width // 4)
-    middle = view.camera.unproject(
-        np.column_stack([column.ravel(), row.ravel()]) * 4.0 + 1.5, np.ones(row.size))
-    off = np.abs(middle[:, :2].reshape(rays.shape) - rays)
-    assert off.max() < 2.01 / 160.0  # half a cell
+    np.testing.assert_allclose(view.rays, rays, atol=1e-6)
 
 
 def test_a_missing_pixel_takes_the_depth_beside_it():

@@ -1,0 +1,108 @@
+"""A second look at one person: enlarged and brought near, as the network sees people best.
+
+Enlarging alone would make giants of far people. Their depth is shifted instead of scaled, so that
+the relief of a body stays what it is: somebody at 4 m who is shown at 1.5 m, with 4 / 1.5 times
+the pixels, is as large, as thick and as far from the wall as before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Float32
+
+from pop_core.geometry.camera import Camera
+from pop_core.keypoints.canonical_depth import SIDE_MULTIPLE, CanonicalView
+from pop_core.keypoints.canonical_depth_kernels import read_depth
+
+SHOWN_AT_M = 1.5
+MARGIN_M = 0.15  # hands, feet and the top of the head lie beyond the joints; guesses err
+SIDES_PX = (96, 224)
+NEAREST_M = 0.05
+# Focal length of the grid that looks are read from, relative to the network's: nobody is enlarged
+# more than a sensor resolves.
+FINEST = 3.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NetworkView:
+    """What a network is shown, and where that really lies.
+
+    Args:
+        camera: The pinhole that the network believes in.
+        enlarged: How many times as long as its focal length the real one is [px].
+        nearer_m: By how much everything is shown nearer than it is [m].
+    """
+
+    camera: Camera
+    enlarged: float = 1.0
+    nearer_m: float = 0.0
+
+    def to_camera(self, shown: Float[np.ndarray, '... 3']) -> Float[np.ndarray, '... 3']:
+        """Return where points that the network speaks of lie in the camera frame [m]."""
+        z = shown[..., 2:]
+        real_z = z + self.nearer_m
+        return np.concatenate([shown[..., :2] / z * (real_z / self.enlarged), real_z], axis=-1)
+
+    def from_camera(self, p_camera: Float[np.ndarray, '... 3']) -> Float[np.ndarray, '... 3']:
+        """Return where the network sees points of the camera frame [m]."""
+        z = p_camera[..., 2:]
+        shown_z = z - self.nearer_m
+        xy = p_camera[..., :2] / z * (shown_z * self.enlarged)
+        return np.concatenate([xy, shown_z], axis=-1)
+
+
+def close_view(
+    focal_px: float, joints: Float[np.ndarray, 's 3'], surface_m: float, fine: CanonicalView
+) -> NetworkView:
+    """Return the view that shows a person near and in the middle, no larger than needed.
+
+    Args:
+        focal_px: The network's focal length.
+        joints: Where the person's joints may be, camera frame [m].
+        surface_m: Depth of the person's surface [m].
+        fine: A view of the camera: beyond its borders there is nothing to show.
+    """
+    enlarged = max(surface_m / SHOWN_AT_M, 1.0)
+    rays = joints[:, :2] / joints[:, 2:]
+    margin = MARGIN_M / surface_m
+    seen = fine.camera
+    last = np.array([seen.width, seen.height]) - 1
+    border = (np.array([[0, 0], last]) - [seen.cx, seen.cy]) / seen.fx
+    low = np.maximum(rays.min(axis=0) - margin, border[0])
+    high = np.minimum(rays.max(axis=0) + margin, border[1])
+    scale = focal_px * enlarged
+    columns, rows = (
+        int(np.clip(SIDE_MULTIPLE * np.ceil(extent / SIDE_MULTIPLE), *SIDES_PX))
+        for extent in (high - low) * scale)
+    centre = np.array([columns - 1, rows - 1]) / 2 - (low + high) / 2 * scale
+    camera = Camera(columns, rows, focal_px, focal_px, float(centre[0]), float(centre[1]))
+    return NetworkView(camera, enlarged, surface_m * (1.0 - 1.0 / enlarged))
+
+
+def close_depth(
+    depth_m: Float32[np.ndarray, 'h w'], fine: CanonicalView, view: NetworkView
+) -> Float32[np.ndarray, 'H W']:
+    """Return what a network is shown of measured depth [m]; 0 where nothing was measured.
+
+    Args:
+        depth_m: Measured depth, NaN where missing.
+        fine: A fine view of the camera, to read from.
+        view: What to show.
+    """
+    shown = view.camera
+    out = np.empty((shown.height, shown.width), dtype=np.float32)
+    rows, columns = (
+        np.rint((np.arange(size) - centre) * scale + fine_centre).astype(np.int64)
+        for size, centre, fine_centre, scale in (
+            (shown.height, shown.cy, fine.camera.cy, _ratio(fine, view)),
+            (shown.width, shown.cx, fine.camera.cx, _ratio(fine, view))))
+    read_depth(
+        depth_m, fine.source_v, fine.source_u, rows, columns, view.nearer_m, NEAREST_M, out)
+    return out
+
+
+def _ratio(fine: CanonicalView, view: NetworkView) -> float:
+    """Return how many pixels of a fine view one of a network's view spans."""
+    return fine.camera.fx / (view.camera.fx * view.enlarged)
