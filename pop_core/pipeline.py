@@ -236,7 +236,7 @@ class BodyPipeline:
         free = ~window.cut(scene.taken)
         own = np.isfinite(depth_m) & free
         if scene.ground is not None:
-            own &= ~scene.ground.floor_pixels(depth_m, camera.ray_grid())
+            own &= ~scene.ground.floor_pixels(depth_m, camera)
         mask = np.zeros(scene.taken.shape, dtype=bool)
         segment = segment_body(depth_m, rendered, own, camera.fx, self.config.segmentation)
         window.view(mask)[:] = with_holes(segment, ~np.isfinite(depth_m) & free, rendered)

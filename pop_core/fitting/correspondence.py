@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.spatial import cKDTree
 
 from pop_core.body.joints import N_JOINTS, PARENTS
 from pop_core.depth_noise import DepthNoise
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.depth_consistency import Sight, Visibility
+from pop_core.fitting.nearest_kernels import nearest
 from pop_core.fitting.observation import Observation
+from pop_core.fitting.pair_kernels import plane_pairs
 from pop_core.fitting.residuals import Pairs, join_pairs, no_pairs
 from pop_core.fitting.robust_loss import geman_mcclure_weight
 
@@ -35,14 +36,12 @@ def thin_points(
     observation: Observation, segment: Bool[np.ndarray, 'h w'], most: int
 ) -> tuple[Float[np.ndarray, 'n 3'], Int[np.ndarray, 'n']]:
     """Return at most `most` points of the segment, evenly over its pixels, and their parts."""
-    v, u = np.nonzero(segment)
-    step = max(1, -(-len(v) // most))
-    mask = np.zeros_like(segment)
-    mask[v[::step], u[::step]] = True
-    parts = np.full(int(mask.sum()), -1)
+    every = np.flatnonzero(segment)
+    pixel = every[:: max(1, -(-len(every) // most))]
+    parts = np.full(len(pixel), -1)
     if observation.labels is not None:
-        parts = observation.labels[mask].astype(np.int64)
-    return observation.points(mask), parts
+        parts = observation.labels.reshape(-1)[pixel].astype(np.int64)
+    return observation.points_at(pixel), parts
 
 
 def match_points(
@@ -66,10 +65,8 @@ def match_points(
     facing = np.flatnonzero(visibility.facing)
     if len(facing) == 0 or len(points) == 0:
         return no_pairs()
-    # A tree for one query: balancing it takes longer than it saves.
-    tree = cKDTree(state.vertices[facing], balanced_tree=False, compact_nodes=False)
-    distance, nearest = tree.query(points)
-    vertex = facing[nearest]
+    which, distance = nearest(points, state.vertices[facing])
+    vertex = facing[which]
     worth = EFFECTIVE_POINTS * geman_mcclure_weight(distance, scale_m)
     # A point recognised as an arm never pulls on the chest it rests on.
     fits = (parts < 0) | NEAR_PARTS[parts, state.body.main_bone[vertex]]
@@ -108,13 +105,9 @@ def _plane_pairs(
             together count for.
         noise: Noise of the measured depth.
     """
-    normal = state.normals[vertex]
-    ray = target / np.linalg.norm(target, axis=1, keepdims=True)
-    cosine = np.clip(-np.einsum('nc,nc->n', normal, ray), 0.1, 1.0)
-    variance = SKIN_SIGMA_M**2 + (cosine * noise.sigma_m(target[:, 2])) ** 2
-    # The sensor sees cloth; the body lies under it.
-    skin = target - state.body.cloth_m[vertex, None] * normal
-    return Pairs(vertex, normal, skin, cosine / variance * worth / len(vertex))
+    sigma_m = noise.sigma_m(target[:, 2])
+    return Pairs(vertex, *plane_pairs(
+        vertex, target, worth, sigma_m, SKIN_SIGMA_M, state.normals, state.body.cloth_m))
 
 
 def tangential_pairs(pairs: Pairs, share: float) -> Pairs:

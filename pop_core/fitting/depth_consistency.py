@@ -11,13 +11,14 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int
+from jaxtyping import Bool, Float, Float32, Int, Int32
 
 from pop_core.fitting.body_state import BodyState
-from pop_core.fitting.observation import NearestPixels, Observation
+from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import Pairs, join_pairs
 from pop_core.fitting.robust_loss import geman_mcclure_weight
 from pop_core.fitting.sight_kernels import see
+from pop_core.geometry.nearest_pixel_kernels import nearest_pixels, nearest_rows
 from pop_core.rendering.depth_renderer import RenderedDepth, render_depth
 
 SELF_TOLERANCE_M = 0.03  # z-buffer against vertex: a triangle's own slope
@@ -87,7 +88,7 @@ class HidingPlaces:
         """Prepare slices for a body whose vertices lie at depths z [m]."""
         self.observation, self.segment = observation, segment
         self.slices_m = np.linspace(z.min(), z.max(), DEPTH_SLICES)
-        self._nearest: dict[int, NearestPixels] = {}
+        self._rows: dict[int, Int32[np.ndarray, 'h w']] = {}
 
     def targets(
         self, points: Float[np.ndarray, 'n 3']
@@ -101,18 +102,19 @@ class HidingPlaces:
         for k in np.unique(which):
             rows = which == k
             # Every other pixel: a pull sideways need not know its end to the pixel.
-            pixel[rows] = 2 * self._slice(int(k)).of(uv[rows] // 2)
+            pixel[rows] = nearest_pixels(self._slice(int(k)), uv[rows] // 2)
         known = pixel[:, 0] >= 0
+        pixel *= 2
         ray = self.observation.rays[pixel[:, 1], pixel[:, 0]]
         return np.column_stack([ray * points[:, 2:], points[:, 2]]), known
 
-    def _slice(self, k: int) -> NearestPixels:
-        if k not in self._nearest:
-            depth_m = self.observation.depth_m
-            with np.errstate(invalid='ignore'):
-                able = self.segment | (depth_m < self.slices_m[k]) | np.isnan(depth_m)
-            self._nearest[k] = NearestPixels(able[::2, ::2])
-        return self._nearest[k]
+    def _slice(self, k: int) -> Int32[np.ndarray, 'h w']:
+        if k not in self._rows:
+            depth_m = self.observation.depth_m[::2, ::2]
+            # Not beyond: nor is what was not measured.
+            self._rows[k] = nearest_rows(
+                self.segment[::2, ::2] | ~(depth_m >= self.slices_m[k]))
+        return self._rows[k]
 
 
 def free_space_pairs(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
@@ -96,8 +95,14 @@ class Observation:
 
     def points(self, mask: Bool[np.ndarray, 'h w']) -> Float[np.ndarray, 'n 3']:
         """Return the measured points of a mask [m], camera frame, in row order."""
-        z = self.depth_m[mask].astype(np.float64)
-        return np.column_stack([self.rays[mask] * z[:, None], z])
+        return self.points_at(np.flatnonzero(mask))
+
+    def points_at(self, pixel: Int[np.ndarray, 'n']) -> Float[np.ndarray, 'n 3']:
+        """Return the measured points [m], camera frame, of pixels numbered row by row."""
+        out = np.empty((len(pixel), 3))
+        out[:, 2] = self.depth_m.reshape(-1)[pixel]
+        np.multiply(self.rays.reshape(-1, 2)[pixel], out[:, 2:], out=out[:, :2])
+        return out
 
     @property
     def recognised(self) -> Bool[np.ndarray, 'h w']:
@@ -157,7 +162,7 @@ def observe(
     parts = None if labels is None else window.cut(labels)
     rays = camera.ray_grid()
     if ground is not None:
-        own &= ~ground.floor_pixels(depth_m, rays)
+        own &= ~ground.floor_pixels(depth_m, camera)
     of_keypoints = keypoint_rays(lifted, frame.camera)
     return Observation(
         window, camera, depth_m, rays, own, parts, lifted, of_keypoints, ground, noise)
@@ -189,24 +194,6 @@ def person_window(lifted: LiftedJoints, camera: Camera) -> Window:
     width, height = max(right - left, 1), max(bottom - top, 1)
     stride = max(1, -(-max(width, height) // WINDOW_PX))
     return Window(min(left, camera.width - 1), min(top, camera.height - 1), width, height, stride)
-
-
-class NearestPixels:
-    """Knows the pixel of a mask that is nearest to any pixel."""
-
-    def __init__(self, mask: Bool[np.ndarray, 'h w']) -> None:
-        """Number the pixels of a mask, and give every other pixel the number of the nearest."""
-        _, self._label = cv2.distanceTransformWithLabels(
-            (~mask).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
-        v, u = np.nonzero(mask)
-        self._pixel_of_label = np.full((len(v) + 1, 2), -1, dtype=np.int64)
-        self._pixel_of_label[self._label[v, u]] = np.column_stack([u, v])
-
-    def of(self, uv: Int[np.ndarray, 'n 2']) -> Int[np.ndarray, 'n 2']:
-        """Return the nearest pixel (u, v) of each pixel; (-1, -1) when the mask is empty."""
-        if len(self._pixel_of_label) == 1:
-            return np.full(uv.shape, -1)
-        return self._pixel_of_label[self._label[uv[:, 1], uv[:, 0]]]
 
 
 def _clamp(value: float, size: int) -> int:

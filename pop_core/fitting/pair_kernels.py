@@ -1,9 +1,37 @@
-"""Numba kernel that merges the pairs of each vertex."""
+"""Numba kernels of point-to-plane pairs: their weights, and one pair for all of a vertex."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def plane_pairs(vertex, target, worth, sigma, skin_sigma, normals, cloth):
+    """Return (direction, target, weight) of point-to-plane pairs, weighted by cos / sigma^2.
+
+    Args:
+        vertex: (n) index of each pair's vertex.
+        target: (n,3) measured point [m].
+        worth: (n) robust weight.
+        sigma: (n) noise of the measured depth along the ray [m].
+        skin_sigma: What no point is surer than [m].
+        normals: (m,3) of all vertices.
+        cloth: (m) how far under the measured surface each vertex lies [m].
+    """
+    n = vertex.shape[0]
+    direction, skin, weight = np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+    for i in range(n):
+        j = vertex[i]
+        x, y, z = target[i, 0], target[i, 1], target[i, 2]
+        along = x * normals[j, 0] + y * normals[j, 1] + z * normals[j, 2]
+        cosine = min(max(-along / np.sqrt(x * x + y * y + z * z), 0.1), 1.0)
+        weight[i] = worth[i] / n * cosine / (skin_sigma**2 + (cosine * sigma[i]) ** 2)
+        for c in range(3):
+            direction[i, c] = normals[j, c]
+            # The sensor sees cloth; the body lies under it.
+            skin[i, c] = target[i, c] - cloth[j] * normals[j, c]
+    return direction, skin, weight
 
 
 @njit(cache=True, nogil=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float32
 
@@ -52,37 +51,10 @@ def segment_body(
         config: Thresholds.
     """
     out = np.zeros(depth_m.shape, dtype=bool)
-    near = _near(rendered, config.growth_m * focal_px)
-    if near is None:
-        return out
-    rendered = RenderedDepth(rendered.depth_m[near], rendered.face[near])
-    covered, own = rendered.covered, own[near]
-    depth_m = np.ascontiguousarray(depth_m[near])
-    distance_px, extended_m = _extend(rendered)
-    with np.errstate(invalid='ignore'):
-        similar = own & (np.abs(depth_m - extended_m) < config.tolerance_m)
-    segment = similar & covered
-    reach_px = config.growth_m * focal_px / np.maximum(extended_m, NEAREST_M)
-    allowed = similar & (distance_px <= reach_px)
-    growth_kernels.grow(segment, allowed, depth_m, config.gamma_m)
-    out[near] = segment
+    images = map(np.ascontiguousarray, (depth_m, rendered.depth_m, own))
+    growth_kernels.segment(
+        *images, config.gamma_m, config.tolerance_m, config.growth_m * focal_px, NEAREST_M, out)
     return out
-
-
-def _near(rendered: RenderedDepth, growth: float) -> tuple[slice, slice] | None:
-    """Return the part of an image that a body's segment can reach; None where no body is.
-
-    Args:
-        rendered: Rendered depth of the body.
-        growth: How far the segment may grow [m px]: over depth, a number of pixels.
-    """
-    covered = rendered.covered
-    v, u = np.flatnonzero(covered.any(axis=1)), np.flatnonzero(covered.any(axis=0))
-    if len(v) == 0:
-        return None
-    reach_px = int(growth / max(float(rendered.depth_m.min()), NEAREST_M)) + 1
-    return (slice(max(v[0] - reach_px, 0), v[-1] + reach_px + 1),
-            slice(max(u[0] - reach_px, 0), u[-1] + reach_px + 1))
 
 
 def with_holes(
@@ -102,20 +74,6 @@ def with_holes(
     holes = unmeasured & rendered.covered
     if not holes.any():
         return segment
-    together = segment | holes
-    count, label = cv2.connectedComponents(together.astype(np.uint8), connectivity=4)
-    touching = np.zeros(count, dtype=bool)
-    touching[label[segment]] = True
-    return np.asarray(together & touching[label])
-
-
-def _extend(
-    rendered: RenderedDepth,
-) -> tuple[Float32[np.ndarray, 'h w'], Float32[np.ndarray, 'h w']]:
-    """Return the distance to the silhouette [px] and the depth of its nearest pixel [m]."""
-    covered = rendered.covered
-    distance, label = cv2.distanceTransformWithLabels(
-        (~covered).astype(np.uint8), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
-    depth_of_label = np.zeros(int(label.max()) + 1, dtype=np.float32)
-    depth_of_label[label[covered]] = rendered.depth_m[covered]
-    return distance, depth_of_label[label]
+    together = segment.copy()
+    growth_kernels.flood(together, holes)
+    return together

@@ -40,18 +40,21 @@ class Ground:
         return p_camera @ self.normal + self.offset_m
 
     def floor_pixels(
-        self, depth_m: Float32[np.ndarray, 'h w'], rays: Float[np.ndarray, 'h w 2']
+        self, depth_m: Float32[np.ndarray, 'h w'], camera: Camera
     ) -> Bool[np.ndarray, 'h w']:
         """Return the pixels that show the floor itself.
 
         Args:
             depth_m: Measured depth [m]; NaN is no floor.
-            rays: (x/z, y/z) of every pixel.
+            camera: The pinhole of the image.
         """
-        along_ray = rays @ self.normal[:2] + self.normal[2]
-        width = FLOOR_M + 0.002 * depth_m**2
+        across = self.normal[0] * (np.arange(camera.width) - camera.cx) / camera.fx
+        down = self.normal[1] * (np.arange(camera.height) - camera.cy) / camera.fy
+        along_ray = (down + self.normal[2]).astype(np.float32)[:, None] + across.astype(np.float32)
+        # height - width of the floor, in the order that needs the fewest passes
+        above = (along_ray - np.float32(0.002) * depth_m) * depth_m
         with np.errstate(invalid='ignore'):
-            return np.asarray(depth_m * along_ray + self.offset_m < width)
+            return np.asarray(above < np.float32(FLOOR_M - self.offset_m))
 
 
 def find_ground(frame: RgbdFrame, tries: int = 60) -> Ground | None:

@@ -1,20 +1,37 @@
-"""Numba kernel of the connected growth of a segment over depth."""
+"""Numba kernels of the segment of a body: what is near the rendered one, and connected to it."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
+from pop_core.geometry.nearest_pixel_kernels import nearest_pixel, nearest_rows
+
 
 @njit(cache=True, nogil=True)
-def grow(segment, allowed, depth_m, gamma_m):
-    """Grow `segment` in place over `allowed` pixels whose depth is within gamma of a neighbour."""
-    h, w = segment.shape
+def segment(depth, rendered, own, gamma, tolerance, growth, nearest, out):
+    """Fill `out` with the measured pixels of a body: those it covers, and the rim joined to them.
+
+    Args:
+        depth: (h,w) measured depth [m].
+        rendered: (h,w) depth of the body alone [m], +inf where it is not.
+        own: (h,w) pixels that may be the person's.
+        gamma: Depth step that is still one surface [m].
+        tolerance: Distance from the body's depth that is still the body [m].
+        growth: How wide the rim is [m px]: over depth, a number of pixels.
+        nearest: Depth that nobody is nearer than [m].
+        out: (h,w), all false.
+    """
+    h, w = depth.shape
+    row = nearest_rows(rendered < np.inf)
+    farthest = growth / max(rendered.min(), nearest)
     queue = np.empty((h * w, 2), dtype=np.int32)
     tail = 0
     for y in range(h):
         for x in range(w):
-            if segment[y, x]:
+            if (rendered[y, x] != np.inf and own[y, x]
+                    and abs(depth[y, x] - rendered[y, x]) < tolerance):
+                out[y, x] = True
                 queue[tail, 0], queue[tail, 1] = y, x
                 tail += 1
     head = 0
@@ -24,9 +41,41 @@ def grow(segment, allowed, depth_m, gamma_m):
         for k in range(4):
             ny = y + (1 if k == 0 else -1 if k == 1 else 0)
             nx = x + (1 if k == 2 else -1 if k == 3 else 0)
-            if ny < 0 or nx < 0 or ny >= h or nx >= w or segment[ny, nx]:
+            if ny < 0 or nx < 0 or ny >= h or nx >= w or out[ny, nx] or not own[ny, nx]:
                 continue
-            if allowed[ny, nx] and abs(depth_m[ny, nx] - depth_m[y, x]) < gamma_m:
-                segment[ny, nx] = True
+            if not abs(depth[ny, nx] - depth[y, x]) < gamma:
+                continue
+            squared, body_y, body_x = nearest_pixel(row, ny, nx, farthest)
+            if body_y < 0:
+                continue
+            body = rendered[body_y, body_x]
+            reach = growth / max(body, nearest)
+            if abs(depth[ny, nx] - body) < tolerance and squared <= reach * reach:
+                out[ny, nx] = True
                 queue[tail, 0], queue[tail, 1] = ny, nx
                 tail += 1
+
+
+@njit(cache=True, nogil=True)
+def flood(inside, allowed):
+    """Add to `inside` the allowed pixels that hang together with it, side by side."""
+    h, w = inside.shape
+    queue = np.empty((h * w, 2), dtype=np.int32)
+    tail = 0
+    for y in range(h):
+        for x in range(w):
+            if inside[y, x]:
+                queue[tail, 0], queue[tail, 1] = y, x
+                tail += 1
+    head = 0
+    while head < tail:
+        y, x = queue[head, 0], queue[head, 1]
+        head += 1
+        for k in range(4):
+            ny = y + (1 if k == 0 else -1 if k == 1 else 0)
+            nx = x + (1 if k == 2 else -1 if k == 3 else 0)
+            if ny < 0 or nx < 0 or ny >= h or nx >= w or inside[ny, nx] or not allowed[ny, nx]:
+                continue
+            inside[ny, nx] = True
+            queue[tail, 0], queue[tail, 1] = ny, nx
+            tail += 1

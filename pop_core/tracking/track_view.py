@@ -43,7 +43,7 @@ def observe_track(
     flying = flying_pixels(dense.cut(frame.depth_m))[::stride, ::stride]
     own = np.isfinite(depth_m) & ~window.cut(others) & ~flying
     if ground is not None:
-        own &= ~ground.floor_pixels(depth_m, rays)
+        own &= ~ground.floor_pixels(depth_m, camera)
     if lifted is None:
         return Observation(
             window, camera, depth_m, rays, own, None, seen_joints(predicted, joint_state),

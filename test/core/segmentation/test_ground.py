@@ -63,14 +63,14 @@ def test_nothing_measured_has_no_floor() -> None:
 def test_floor_pixels_are_those_of_the_floor() -> None:
     depth, truth = room(0.4, 0.0, 1.4, noise=0.0)
     rays = CAMERA.ray_grid()
-    marked = truth.floor_pixels(depth, rays)
+    marked = truth.floor_pixels(depth, CAMERA)
     assert marked[depth < 5.0].all()
     points = np.dstack([rays * depth[..., None], depth]).reshape(-1, 3)
     high = truth.height(points).reshape(depth.shape) > 0.1  # twice the band at 5 m
     assert high.any()
     assert not marked[high].any()
     raised = np.where(depth < 5.0, depth * 0.9, depth).astype(np.float32)
-    assert not truth.floor_pixels(raised, rays)[depth < 5.0].any()
+    assert not truth.floor_pixels(raised, CAMERA)[depth < 5.0].any()
 
 
 @pytest.mark.filterwarnings('error')
