@@ -170,7 +170,7 @@ class BodyFitter:
         pairs = self.steps.surface_pairs(
             coarse, observation, visibility, segment, LATE_SCALES_M[-1])
         energy = BodyEnergy(coarse, observation, winner.belief, self.steps.weights(), pairs)
-        blocks = energy.residuals(coarse, True)
+        blocks = energy.terms(coarse, True)
         energies = {
             'E_J3D': cost_of(blocks[:1]), 'E_prior': cost_of(blocks[PRIOR_BLOCKS]),
             'E_NN': cost_of(blocks[PAIR_BLOCKS]),

@@ -8,12 +8,12 @@ import numpy as np
 from jaxtyping import Float
 
 from pop_core.fitting.body_state import BodyState
-from pop_core.fitting.levenberg_marquardt import Residual
+from pop_core.fitting.levenberg_marquardt import Term
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.priors import (
     conditional_prior_residual,
     limit_prior_residual,
-    pose_prior_residual,
+    pose_prior_term,
     scale_weight,
     shape_prior_residual,
 )
@@ -29,7 +29,7 @@ from pop_core.fitting.robust_loss import Kernel, geman_mcclure_weight
 from pop_core.fitting.self_collision import collision_residual
 from pop_core.retrieval.pose_prior import PosePrior
 
-# Which blocks of `BodyEnergy.residuals` say what; those after the priors are pairs of E_NN.
+# Which of `BodyEnergy.terms` say what; those after the priors are pairs of E_NN.
 JOINT_BLOCKS = slice(0, 2)
 PRIOR_BLOCKS = slice(2, 7)
 PAIR_BLOCKS = slice(7, None)
@@ -90,14 +90,14 @@ class BodyEnergy:
         self.ray_weight = weights.joints * ray_weight(state, rays, kernel)
         self.scale_weight = scale_weight(state, kernel)
 
-    def residuals(self, state: BodyState, jacobian: bool) -> list[Residual]:
-        """Return every block of residuals at a state."""
+    def terms(self, state: BodyState, jacobian: bool) -> list[Term]:
+        """Return every term at a state."""
         lifted, rays = self.observation.lifted, self.observation.keypoint_rays
         belief, weights = self.belief, self.weights
-        blocks = [
+        blocks: list[Term] = [
             joint_residual(state, lifted, self.joint_weight, jacobian=jacobian),
             ray_residual(state, rays, self.ray_weight, jacobian=jacobian),
-            pose_prior_residual(state, belief.prior, weights.prior, jacobian=jacobian),
+            pose_prior_term(state, belief.prior, weights.prior, jacobian=jacobian),
             conditional_prior_residual(
                 state, belief.pose, belief.sigma_rad, weights.neighbours, jacobian=jacobian),
             limit_prior_residual(state, jacobian=jacobian),

@@ -85,7 +85,7 @@ class TracedSteps(HypothesisSteps):
     ) -> tuple[float, float]:
         state = hypothesis.state
         energy = BodyEnergy(state, observation, hypothesis.belief, self.weights(), None)
-        joints = cost_of(energy.residuals(state, False)[:1])
+        joints = cost_of(energy.terms(state, False)[:1])
         rendered = render_body(state, observation)
         segment = self.segment(rendered, observation)
         return joints, depth_energy(rendered, observation, segment)

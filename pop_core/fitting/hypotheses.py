@@ -125,7 +125,7 @@ class HypothesisSteps:
             rendered = render_body(hypothesis.state, observation)
             depth = depth_energy(rendered, observation, segment)
             hypothesis.cost = DEPTH_SCORE * depth + cost_of(
-                energy.residuals(hypothesis.state, False))
+                energy.terms(hypothesis.state, False))
 
     def common_segment(
         self, hypotheses: Sequence[Hypothesis], observation: Observation
@@ -185,7 +185,7 @@ class HypothesisSteps:
             hypothesis.state, observation, hypothesis.belief, weights,
             join_pairs(every) if every else None)
         report = levenberg_marquardt_step(
-            hypothesis.state, energy.residuals, BodyState.moved, active, hypothesis.damping)
+            hypothesis.state, energy.terms, BodyState.moved, active, hypothesis.damping)
         hypothesis.state, hypothesis.damping = report.state, report.damping
         hypothesis.cost = report.cost_after
 

@@ -33,9 +33,33 @@ class Residual:
     J: Float[np.ndarray, 'n x'] | None
     w: Float[np.ndarray, 'n']
 
+    @property
+    def cost(self) -> float:
+        """Return 1/2 sum w r^2."""
+        return 0.5 * float(np.dot(self.w * self.r, self.r))
+
     def first(self, n: int) -> Residual:
         """Return the first n residuals."""
         return Residual(self.r[:n], None if self.J is None else self.J[:n], self.w[:n])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Quadratic:
+    """A term at one state that knows its own quadratic model, at less than the price of rows.
+
+    Args:
+        cost: What it costs.
+        gradient: Derivative of the cost with respect to the step, or None when only the cost is
+            wanted.
+        hessian: J'WJ, as Gauss and Newton have it, or None.
+    """
+
+    cost: float
+    gradient: Float[np.ndarray, 'x'] | None = None
+    hessian: Float[np.ndarray, 'x x'] | None = None
+
+
+Term = Residual | Quadratic
 
 
 def no_residual(size: int) -> Residual:
@@ -63,14 +87,16 @@ class StepReport(Generic[StateT]):
     accepted: bool
 
 
-def cost_of(blocks: Sequence[Residual]) -> float:
-    """Return 1/2 sum w r^2 over all blocks."""
-    return 0.5 * sum(float(np.dot(block.w * block.r, block.r)) for block in blocks)
+def cost_of(blocks: Sequence[Term]) -> float:
+    """Return what all terms cost."""
+    return sum(block.cost for block in blocks)
 
 
-def assemble(blocks: Sequence[Residual], size: int) -> NormalEquations:
-    """Return J'wr and J'wJ summed over blocks."""
-    linear = [block for block in blocks if block.J is not None and len(block.r)]
+def assemble(blocks: Sequence[Term], size: int) -> NormalEquations:
+    """Return J'wr and J'wJ summed over all terms."""
+    linear = [
+        block for block in blocks
+        if isinstance(block, Residual) and block.J is not None and len(block.r)]
     count = sum(len(block.r) for block in linear)
     J, r, row = np.empty((count, size)), np.empty(count), 0
     for block in linear:
@@ -81,7 +107,12 @@ def assemble(blocks: Sequence[Residual], size: int) -> NormalEquations:
         row = rows.stop
     # dsyrk forms one triangle only, half the work of a product; once, not block by block.
     upper = blas.dsyrk(1.0, J.T, lower=0) if count else np.zeros((size, size))
-    return NormalEquations(cost_of(blocks), J.T @ r, with_lower(upper))
+    gradient, hessian = J.T @ r, with_lower(upper)
+    for block in blocks:
+        if isinstance(block, Quadratic) and block.gradient is not None:
+            gradient += block.gradient
+            hessian += block.hessian
+    return NormalEquations(cost_of(blocks), gradient, hessian)
 
 
 def with_lower(upper: Float[np.ndarray, 'x x']) -> Float[np.ndarray, 'x x']:
@@ -114,7 +145,7 @@ def damped_step(
 
 def levenberg_marquardt_step(
     state: StateT,
-    evaluate: Callable[[StateT, bool], Sequence[Residual]],
+    evaluate: Callable[[StateT, bool], Sequence[Term]],
     retract: Callable[[StateT, Float[np.ndarray, 'x']], StateT],
     active: Bool[np.ndarray, 'x'],
     damping: float,
@@ -125,7 +156,7 @@ def levenberg_marquardt_step(
 
     Args:
         state: Where to linearise.
-        evaluate: Returns the residual blocks of a state, with Jacobians when asked.
+        evaluate: Returns the terms at a state, with derivatives when asked.
         retract: Moves a state by a step.
         active: Which parameters may move.
         damping: Damping of the last step.

@@ -1,6 +1,6 @@
 """Terms that keep a body plausible where the sensor is silent.
 
-Each is a weighted residual of the parameters alone. Rotation derivatives are with respect to the
+Each is a term of the parameters alone. Rotation derivatives are with respect to the
 solver's left increments.
 """
 
@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from pop_core.body.joint_limits import limit_residual
 from pop_core.fitting.body_state import BODY_POSE, BodyState, betas_slice
-from pop_core.fitting.levenberg_marquardt import Residual, no_residual
+from pop_core.fitting.levenberg_marquardt import Quadratic, Residual, no_residual
 from pop_core.fitting.robust_loss import Kernel
 from pop_core.geometry.rotation import from_rotvec, left_jacobian_inverse, to_rotvec
 from pop_core.retrieval.candidate import PoseCandidate
@@ -24,13 +24,18 @@ SCALE_TAIL = 2.5  # in sigmas: beyond it a small body is a child, not an unlikel
 LIMIT_SIGMA_RAD = 0.05
 
 
-def pose_prior_residual(
+def pose_prior_term(
     state: BodyState, prior: PosePrior, weight: float, *, jacobian: bool
-) -> Residual:
-    """Return the whitened distance to the nearest component of the pose prior."""
-    r, J = prior.residual(state.parameters.body_pose, jacobian=jacobian)
-    return Residual(
-        r, None if J is None else _at(state, J, BODY_POSE), np.full(len(r), weight))
+) -> Quadratic:
+    """Return the squared distance to the nearest component of the pose prior."""
+    pose = state.parameters.body_pose
+    if not jacobian:
+        return Quadratic(weight * prior.cost(pose))
+    cost, of_pose, curvature = prior.quadratic(pose)
+    gradient, hessian = np.zeros(state.body.size), np.zeros((state.body.size, state.body.size))
+    gradient[BODY_POSE] = weight * of_pose
+    hessian[BODY_POSE, BODY_POSE] = weight * curvature
+    return Quadratic(weight * cost, gradient, hessian)
 
 
 def limit_prior_residual(state: BodyState, *, jacobian: bool) -> Residual:

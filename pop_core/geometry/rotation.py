@@ -37,18 +37,4 @@ def nearest_rotation(matrix: Float[np.ndarray, '3 3']) -> Float[np.ndarray, '3 3
 
 def left_jacobian_inverse(rotvec: Float[np.ndarray, 'n 3']) -> Float[np.ndarray, 'n 3 3']:
     """Return d(log(exp(delta) R))/d(delta) at delta = 0 for R = exp(rotvec) (Chirikjian 2012)."""
-    angle = np.linalg.norm(rotvec, axis=1)
-    near_zero = angle < 1e-4
-    safe = np.where(near_zero, 1.0, angle)
-    general = 1 / safe**2 - (1 + np.cos(safe)) / (2 * safe * np.maximum(np.sin(safe), 1e-9))
-    # At a half turn the general form is 0/0 in one factor; its limit is 1/pi^2.
-    factor = np.where(near_zero, 1 / 12, np.where(safe > np.pi - 1e-6, 1 / np.pi**2, general))
-    cross = skew(rotvec)
-    return np.eye(3) - 0.5 * cross + factor[:, None, None] * (cross @ cross)
-
-
-def skew(vector: Float[np.ndarray, 'n 3']) -> Float[np.ndarray, 'n 3 3']:
-    """Return the matrices that take the cross product with vectors from the left."""
-    out = np.zeros((len(vector), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -vector[:, 2], vector[:, 1], -vector[:, 0]
-    return out - out.transpose(0, 2, 1)
+    return np.asarray(kernels.left_jacobian_inverse(np.asarray(rotvec, dtype=np.float64)))

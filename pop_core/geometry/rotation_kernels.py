@@ -56,3 +56,27 @@ def rotation_vectors(matrices):
         factor = 2.0 * np.arctan2(sine, w) / sine if sine > 1e-12 * w else 2.0 / w
         out[i, 0], out[i, 1], out[i, 2] = factor * x, factor * y, factor * z
     return out
+
+
+@njit(cache=True, nogil=True)
+def left_jacobian_inverse(rotvecs):
+    """Return the inverse left Jacobians of SO(3) (n,3,3) at rotation vectors (n,3) [rad]."""
+    out = np.empty((rotvecs.shape[0], 3, 3))
+    for i in range(rotvecs.shape[0]):
+        v = rotvecs[i]
+        angle2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+        angle = np.sqrt(angle2)
+        if angle < 1e-4:
+            factor = 1.0 / 12.0
+        elif angle > np.pi - 1e-6:
+            factor = 1.0 / np.pi**2  # the limit at a half turn of what is 0/0 there
+        else:
+            factor = 1.0 / angle2 - (1.0 + np.cos(angle)) / (2.0 * angle * np.sin(angle))
+        for row in range(3):
+            for column in range(3):
+                out[i, row, column] = factor * v[row] * v[column]
+            out[i, row, row] += 1.0 - factor * angle2
+            nxt, last = (row + 1) % 3, (row + 2) % 3
+            out[i, row, nxt] += 0.5 * v[last]
+            out[i, row, last] -= 0.5 * v[nxt]
+    return out

@@ -68,12 +68,12 @@ def rasterize(vertices, faces, fx, fy, cx, cy, closed, depth, face_id):
 
 
 @njit(cache=True, nogil=True)
-def rasterize_parts(vertices, faces, part, fx, fy, cx, cy, depth):
+def rasterize_parts(vertices, faces, part, fx, fy, cx, cy, closed, depth):
     """Draw each part of a mesh into a depth image of its own (p,h,w, +inf = nothing)."""
     u, v, inverse = _seen(vertices, fx, fy, cx, cy)
     face_id = np.empty(depth.shape[1:], dtype=np.int32)
     for t in range(faces.shape[0]):
-        _draw(t, faces[t, 0], faces[t, 1], faces[t, 2], u, v, inverse, False, depth[part[t]],
+        _draw(t, faces[t, 0], faces[t, 1], faces[t, 2], u, v, inverse, closed, depth[part[t]],
               face_id)
 
 

@@ -56,7 +56,7 @@ def render_depth(
 
 def render_parts(
     vertices_camera: Float[np.ndarray, 'n 3'], f: Int[np.ndarray, 'm 3'],
-    part: Int[np.ndarray, 'm'], count: int, camera: Camera,
+    part: Int[np.ndarray, 'm'], count: int, camera: Camera, *, closed: bool = False,
 ) -> Float32[np.ndarray, 'p h w']:
     """Return the z-buffer of each part of a mesh alone [m]; +inf where it is not seen.
 
@@ -66,12 +66,14 @@ def render_parts(
         part: Part of each triangle, 0 to count - 1.
         count: How many parts.
         camera: The pinhole.
+        closed: Whether the whole mesh is: then faces that look away are left out, and a part has
+            no inside where it was cut from the others.
     """
     depth_m = np.full((count, camera.height, camera.width), np.inf, dtype=np.float32)
     depth_kernels.rasterize_parts(
         np.ascontiguousarray(vertices_camera, dtype=np.float64),
         np.ascontiguousarray(f, dtype=np.int64), np.ascontiguousarray(part, dtype=np.int64),
-        camera.fx, camera.fy, camera.cx, camera.cy, depth_m)
+        camera.fx, camera.fy, camera.cx, camera.cy, closed, depth_m)
     return depth_m
 
 

@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float, Int
 
 from pop_core.body.joint_limits import TWIST_AXES, pose_coordinates
 from pop_core.errors import LibraryFileError
+from pop_core.geometry.block_kernels import sandwich
 from pop_core.geometry.swing_twist import from_swing_twist, swing_twist_jacobian
 
 DEFAULT_FILE = Path(__file__).resolve().parents[1] / 'data' / 'pose_prior.npz'
@@ -43,8 +44,9 @@ class PosePrior:
     factors: Float[np.ndarray, 'k x r']
     variances: Float[np.ndarray, 'k x']
     from_motion: Bool[np.ndarray, 'k']
-    # Derived once: L^-1 of each covariance L L^T, and -log of each component's peak density.
+    # Derived once: L^-1 and inverse of each covariance L L^T, -log of each peak density.
     whiteners: Float[np.ndarray, 'k x x'] = field(init=False)
+    precisions: Float[np.ndarray, 'k x x'] = field(init=False)
     peak_costs: Float[np.ndarray, 'k'] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -60,7 +62,9 @@ class PosePrior:
         lower = np.linalg.cholesky(covariance)
         half_log_det = np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
         normaliser = 0.5 * N_COORDINATES * np.log(2.0 * np.pi)
-        object.__setattr__(self, 'whiteners', np.linalg.inv(lower))
+        whiteners = np.linalg.inv(lower)
+        object.__setattr__(self, 'whiteners', whiteners)
+        object.__setattr__(self, 'precisions', whiteners.transpose(0, 2, 1) @ whiteners)
         object.__setattr__(self, 'peak_costs', half_log_det + normaliser - np.log(self.weights))
 
     def motion_part(self) -> PosePrior:
@@ -82,29 +86,31 @@ class PosePrior:
         c = pose_coordinates(body_pose).reshape(len(body_pose), -1)
         return np.asarray(np.logaddexp.reduce(-self.component_costs(c), axis=1))
 
-    def residual(
-        self, body_pose: Float[np.ndarray, '23 3'], *, jacobian: bool = True
-    ) -> tuple[Float[np.ndarray, 'r'], Float[np.ndarray, 'r 69'] | None]:
-        """Return whitened residuals of the most likely component: 0.5 |r|^2 = -log p + const.
+    def cost(self, body_pose: Float[np.ndarray, '23 3']) -> float:
+        """Return -log p of the most likely component, but for a constant: never below zero.
 
-        The last residual carries what the component's weight and volume cost above the cheapest
-        component, so that the energy does not jump when another component takes over.
+        What the component's weight and volume cost above the cheapest component is part of it, so
+        that the energy does not jump when another component takes over.
+        """
+        c = pose_coordinates(body_pose).reshape(1, -1)
+        return float(self.component_costs(c).min() - self.peak_costs.min())
 
-        Returns:
-            r (70) and, if wanted, dr/d(delta) for left increments R_j <- exp(delta_j) R_j of the
-            23 joints.
+    def quadratic(
+        self, body_pose: Float[np.ndarray, '23 3']
+    ) -> tuple[float, Float[np.ndarray, '69'], Float[np.ndarray, '69 69']]:
+        """Return `cost` with its gradient and Gauss-Newton Hessian.
+
+        Derivatives are with respect to left increments R_j <- exp(delta_j) R_j of the 23 joints.
         """
         c = pose_coordinates(body_pose)
-        best = int(np.argmin(self.component_costs(c.reshape(1, -1))[0]))
-        white = self.whiteners[best]
-        extra = np.sqrt(2.0 * (self.peak_costs[best] - self.peak_costs.min()))
-        r = np.append(white @ (c.reshape(-1) - self.means[best]), extra)
-        if not jacobian:
-            return r, None
-        turned = white.reshape(-1, 23, 3).transpose(1, 0, 2) @ swing_twist_jacobian(c, TWIST_AXES)
-        J = np.zeros((N_COORDINATES + 1, N_COORDINATES))
-        J[:-1] = turned.transpose(1, 0, 2).reshape(-1, N_COORDINATES)
-        return r, J
+        costs = self.component_costs(c.reshape(1, -1))[0]
+        best = int(np.argmin(costs))
+        turn = swing_twist_jacobian(c, TWIST_AXES)
+        pull = self.precisions[best] @ (c.reshape(-1) - self.means[best])
+        gradient = np.einsum('jab,ja->jb', turn, pull.reshape(-1, 3)).reshape(-1)
+        return (
+            float(costs[best] - self.peak_costs.min()), gradient,
+            np.asarray(sandwich(self.precisions[best], turn, 0)))
 
     def sample(self, rng: np.random.Generator, n: int) -> Float[np.ndarray, 'n 23 3']:
         """Return n poses (rotation vectors [rad]) drawn from the mixture, limits not applied."""

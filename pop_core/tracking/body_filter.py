@@ -104,16 +104,17 @@ def predict(
 
 
 def update(
-    predicted: FilterState, fitted: BodyParameters, information: Float[np.ndarray, 'x x']
+    predicted: FilterState, fitted: BodyParameters, before: Float[np.ndarray, 'x x'],
+    information: Float[np.ndarray, 'x x'],
 ) -> FilterState:
     """Return the belief after a fit that held the prediction as a residual.
 
     Args:
         predicted: The belief before.
         fitted: The fit, already the mean of prediction, measurement and priors.
+        before: Inverse of the predicted covariance.
         information: J'WJ of what was measured, without priors and without the prediction.
     """
-    before = inverse(predicted.covariance)
     covariance = inverse(before + information)
     gain = predicted.mixed.T @ before
     # Speeds are learned from what was seen: a prior that pulls a hidden limb is no motion.

@@ -230,7 +230,6 @@ class Follower:
         if lifted is not None:
             track.unnamed = unnamed_joints(fit.state, lifted)
         body = fit.as_body_fit(
-            inverse(track.filter.covariance) + fit.curvature.prior,
             [self._body(other.filter) for other in track.alternatives], track.unnamed)
         if lifted is not None:
             track.trust = plausibility(body, lifted)

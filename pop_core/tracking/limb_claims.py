@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
-from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -23,13 +22,14 @@ from pop_core.fitting.limb_points import KINDS
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import Pairs
 from pop_core.rendering.depth_renderer import render_parts
+from pop_core.tracking.claim_kernels import claimed_shares
 
 LIMBS = tuple(kind.joints for kind in KINDS)
 TRUNK = len(LIMBS)  # the part of all that is no limb
 ARM_LIMBS, LEG_LIMBS = (0, 1), (2, 3)  # in the order of KINDS
 ENDS = np.array([SHARED_INDEX[JOINT_NAMES[limb[2]]] for limb in LIMBS])  # wrists and ankles
 TRUNK_SIGMA_M = 0.02  # cloth, and the place of what is surer
-RIM_PX = 5  # cloth and hair make a body wider than its model
+RIM_PX = 2  # cloth and hair make a body wider than its model
 OPEN_M = 0.08  # in front of what is measured
 HIDDEN_SHARE, FEWEST_POINTS = 0.5, 20.0
 
@@ -90,13 +90,11 @@ class LimbClaims:
         self.observation = observation
         self.limb_of_vertex, part_of_face = parts_of(state.body)
         order = [TRUNK, *np.argsort(doubt_m[ENDS], kind='stable').tolist()]
-        alone_m = render_parts(
-            state.vertices, state.body.faces, part_of_face, TRUNK + 1, observation.camera)
-        surer = np.full(observation.depth_m.shape, np.inf, dtype=np.float32)
-        self._surer_m = np.empty((len(LIMBS), *surer.shape), dtype=np.float32)
-        for part, following in pairwise(order):
-            surer = np.minimum(surer, alone_m[part])
-            self._surer_m[following] = cv2.erode(surer, np.ones((RIM_PX, RIM_PX), np.uint8))
+        rank = np.argsort(order)
+        self._is_surer = rank[None, :] < rank[:TRUNK, None]
+        self._alone_m = render_parts(
+            state.vertices, state.body.faces, part_of_face, TRUNK + 1, observation.camera,
+            closed=state.body.is_closed)
 
     def weighed(self, pairs: Pairs) -> tuple[Pairs, Float[np.ndarray, '4']]:
         """Return pairs by what they say of limbs, and the weight that is left to each limb.
@@ -122,9 +120,8 @@ class LimbClaims:
         self, points: Float[np.ndarray, 'n 3'], limb: Int[np.ndarray, 'n']
     ) -> Float[np.ndarray, 'n']:
         """Return how little each point is explained by what is surer than its limb, 0..1."""
-        camera = self.observation.camera
-        last = np.array([camera.width, camera.height]) - 1
-        u, v = np.clip(np.rint(camera.project(points)), 0, last).astype(np.int64).T
-        sigma_m = np.hypot(TRUNK_SIGMA_M, self.observation.noise.sigma_m(points[:, 2]))
-        apart = (self._surer_m[limb, v, u] - points[:, 2]) / sigma_m
-        return np.asarray(1.0 - np.exp(-0.5 * apart**2))
+        camera, noise = self.observation.camera, self.observation.noise
+        sigma_m = np.hypot(TRUNK_SIGMA_M, noise.sigma_m(points[:, 2]))
+        return np.asarray(claimed_shares(
+            points, limb, sigma_m, self._alone_m, self._is_surer, RIM_PX,
+            camera.fx, camera.fy, camera.cx, camera.cy))

@@ -53,7 +53,7 @@ class LimbSearch:
         for _ in range(STEPS):
             energy = BodyEnergy(body, observation, belief, weights)
             report = levenberg_marquardt_step(
-                body, energy.residuals, BodyState.moved, active, damping)
+                body, energy.terms, BodyState.moved, active, damping)
             body, damping = report.state, report.damping
         return body.parameters
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.linalg import cholesky
 
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.energy import (
@@ -17,24 +16,26 @@ from pop_core.fitting.energy import (
     PriorBelief,
     TermWeights,
 )
-from pop_core.fitting.levenberg_marquardt import Residual, assemble
+from pop_core.fitting.levenberg_marquardt import Quadratic, Residual, Term, assemble
 from pop_core.fitting.observation import Observation
-from pop_core.fitting.priors import limit_prior_residual, pose_prior_residual
+from pop_core.fitting.priors import limit_prior_residual, pose_prior_term
 from pop_core.fitting.robust_loss import geman_mcclure_weight
+from pop_core.geometry.block_kernels import sandwich
 from pop_core.geometry.rotation import left_jacobian_inverse
 from pop_core.retrieval.pose_prior import PosePrior
 from pop_core.tracking.body_filter import FilterState, difference, inverse
 from pop_core.tracking.measured_surface import SurfaceTerms
 from pop_core.tracking.motion import N_MOVING
 
+TURNS = slice(3, N_MOVING)  # the increments of rotations
 SURE_SIGMAS = 2.0  # a joint may be found this far from its prediction, and be the joint
 
 
 class Prediction:
-    """A predicted body as residual: whitened distance by the filter's covariance."""
+    """A predicted body as a term: squared distance by the filter's covariance."""
 
     def __init__(self, predicted: FilterState, body: BodyState) -> None:
-        """Factorise the covariance of a predicted state.
+        """Invert the covariance of a predicted state.
 
         Args:
             predicted: The belief before the frame was looked at.
@@ -42,17 +43,22 @@ class Prediction:
         """
         self.parameters = predicted.parameters
         self.information = inverse(predicted.covariance)
-        self._root = cholesky(self.information, lower=False, check_finite=False)
         J = body.landmark_jacobian()
         variance = np.einsum('sax,sax->s', J @ predicted.covariance, J) / 3.0
         self.landmark_sigma_m = np.sqrt(variance)
 
-    def residual(self, state: BodyState, *, jacobian: bool) -> Residual:
-        """Return L'(x - predicted) with L L' the predicted information."""
+    def term(self, state: BodyState, *, jacobian: bool) -> Quadratic:
+        """Return 1/2 (x - predicted)' information (x - predicted)."""
         step = difference(state.parameters, self.parameters)
-        r = self._root @ step
-        J = self._root @ _step_jacobian(step) if jacobian else None
-        return Residual(r, J, np.ones(len(r)))
+        pull = self.information @ step
+        cost = 0.5 * float(step @ pull)
+        if not jacobian:
+            return Quadratic(cost)
+        # d(difference)/d(increment) is the unit matrix but where rotations turn.
+        turn = left_jacobian_inverse(step[TURNS].reshape(-1, 3))
+        hessian = sandwich(self.information, turn, TURNS.start)
+        pull[TURNS] = np.einsum('jab,ja->jb', turn, pull[TURNS].reshape(-1, 3)).reshape(-1)
+        return Quadratic(cost, pull, np.asarray(hessian))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,17 +88,19 @@ class TrackedEnergy:
         self._energy.joint_weight = _joint_weight(state, observation, weights, prediction)
         self._prediction, self._n_measured = prediction, surface.n_measured
 
-    def residuals(self, state: BodyState, jacobian: bool) -> list[Residual]:
-        """Return every block of residuals at a state."""
+    def terms(self, state: BodyState, jacobian: bool) -> list[Term]:
+        """Return every term at a state."""
         return [
-            *self._energy.residuals(state, jacobian),
-            self._prediction.residual(state, jacobian=jacobian)]
+            *self._energy.terms(state, jacobian),
+            self._prediction.term(state, jacobian=jacobian)]
 
-    def curvature(self, state: BodyState) -> tuple[Curvature, list[Residual]]:
-        """Return what bends the energy at a state, and the blocks it was made of."""
-        blocks = self._energy.residuals(state, True)
+    def curvature(self, state: BodyState) -> tuple[Curvature, list[Term]]:
+        """Return what bends the energy at a state, and the terms it was made of."""
+        blocks = self._energy.terms(state, True)
         size = state.body.size
-        measured = [block.first(self._n_measured) for block in blocks[PAIR_BLOCKS]]
+        measured = [
+            block.first(self._n_measured) for block in blocks[PAIR_BLOCKS]
+            if isinstance(block, Residual)]
         return Curvature(
             assemble([*blocks[JOINT_BLOCKS], *measured], size).hessian,
             assemble(blocks[PRIOR_BLOCKS], size).hessian), blocks
@@ -102,8 +110,8 @@ def prior_curvature(
     state: BodyState, prior: PosePrior, weight: float
 ) -> Float[np.ndarray, 'x x']:
     """Return J'WJ of what is believed of any pose."""
-    blocks = [
-        pose_prior_residual(state, prior, weight, jacobian=True),
+    blocks: list[Term] = [
+        pose_prior_term(state, prior, weight, jacobian=True),
         limit_prior_residual(state, jacobian=True)]
     return assemble(blocks, state.body.size).hessian
 
@@ -123,10 +131,3 @@ def _joint_weight(
     robust = geman_mcclure_weight(np.linalg.norm(offset, axis=1) / scale_m, 1.0)
     return np.where(lifted.lifted, weights.joints * robust / lifted.sigma_m**2, 0.0)
 
-
-def _step_jacobian(step: Float[np.ndarray, 'x']) -> Float[np.ndarray, 'x x']:
-    """Return d(difference)/d(increment) at a difference: eye except where rotations turn."""
-    out = np.eye(len(step))
-    for j, block in enumerate(left_jacobian_inverse(step[3:N_MOVING].reshape(-1, 3))):
-        out[3 + 3 * j: 6 + 3 * j, 3 + 3 * j: 6 + 3 * j] = block
-    return out

@@ -99,26 +99,27 @@ class WarmFit(FollowedBody):
     """A body followed into a frame.
 
     Args:
+        before: Inverse covariance of the belief it began with.
         curvature: J'WJ of measurements and priors.
         energies: Final energies by name.
     """
 
+    before: Float[np.ndarray, 'x x']
     curvature: Curvature
     energies: dict[str, float]
 
     def as_body_fit(
-        self, hessian: Float[np.ndarray, 'x x'], alternatives: Sequence[BodyState],
-        unnamed: Bool[np.ndarray, '24'],
+        self, alternatives: Sequence[BodyState], unnamed: Bool[np.ndarray, '24']
     ) -> BodyFit:
-        """Return the fit as one of a single frame.
+        """Return the fit as one of a single frame, with the curvature of all that is known.
 
         Args:
-            hessian: Curvature of all that is known.
             alternatives: Other explanations of the person.
             unnamed: Joints of limbs that no keypoint confirmed at the last look.
         """
         left = disagreement(
             self.state, alternatives, [0.0] * len(alternatives), (), unnamed)
+        hessian = self.before + self.curvature.data + self.curvature.prior
         return BodyFit(
             self.state.parameters, hessian, self.visibility, self.state, self.segment,
             self.energies, tuple(other.parameters for other in alternatives), left)
@@ -126,7 +127,7 @@ class WarmFit(FollowedBody):
 
 def updated(predicted: FilterState, fit: WarmFit) -> FilterState:
     """Return the belief after a fit."""
-    return update(predicted, fit.state.parameters, fit.curvature.data)
+    return update(predicted, fit.state.parameters, fit.before, fit.curvature.data)
 
 
 class WarmStart:
@@ -177,7 +178,7 @@ class WarmStart:
             energy = TrackedEnergy(
                 state, observation, self.fitter.prior, weights, surface, prediction)
             report = levenberg_marquardt_step(
-                state, energy.residuals, BodyState.moved, active, damping)
+                state, energy.terms, BodyState.moved, active, damping)
             state, damping = report.state, report.damping
             visibility = see_body(state, observation)
             segment = self.fitter.steps.segment(visibility.rendered, observation)
@@ -187,7 +188,9 @@ class WarmStart:
             'E_NN': cost_of(blocks[PAIR_BLOCKS]) + surface.spread,
             'E_depth': depth_energy(visibility.rendered, observation, segment),
         }
-        return WarmFit(state, visibility, segment, surface.of_limb, curvature, energies)
+        return WarmFit(
+            state, visibility, segment, surface.of_limb, prediction.information, curvature,
+            energies)
 
 
 def farthest_joint_m(state: BodyState, observation: Observation) -> float:

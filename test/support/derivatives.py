@@ -1,11 +1,11 @@
-"""Jacobians of residuals against central differences."""
+"""Derivatives of terms against central differences."""
 
 from collections.abc import Callable
 
 import numpy as np
 
 from pop_core.fitting.body_state import BodyState
-from pop_core.fitting.levenberg_marquardt import Residual
+from pop_core.fitting.levenberg_marquardt import Quadratic, Residual
 
 STEP = 1e-6
 
@@ -20,3 +20,16 @@ def assert_is_derivative(term: Callable[[BodyState, bool], Residual], state: Bod
         ahead, behind = term(state.moved(step), False), term(state.moved(-step), False)
         numeric = (ahead.r - behind.r) / (2 * STEP)
         np.testing.assert_allclose(block.J[:, k], numeric, rtol=2e-5, atol=1e-6)
+
+
+def assert_is_gradient(term: Callable[[BodyState, bool], Quadratic], state: BodyState) -> None:
+    model = term(state, True)
+    assert model.gradient is not None
+    assert model.gradient.any()
+    assert np.isclose(model.cost, term(state, False).cost, rtol=1e-9)
+    for k in range(state.body.size):
+        step = np.zeros(state.body.size)
+        step[k] = STEP
+        ahead, behind = term(state.moved(step), False), term(state.moved(-step), False)
+        numeric = (ahead.cost - behind.cost) / (2 * STEP)
+        np.testing.assert_allclose(model.gradient[k], numeric, rtol=1e-4, atol=1e-4)

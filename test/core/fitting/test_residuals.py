@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.derivatives import assert_is_derivative
+from support.derivatives import assert_is_derivative, assert_is_gradient
 from support.one_person import CAMERA, lift_truth
 
 from pop_core.body.model import BodyModel, BodyParameters
@@ -12,7 +12,7 @@ from pop_core.fitting.observation import keypoint_rays
 from pop_core.fitting.priors import (
     conditional_prior_residual,
     limit_prior_residual,
-    pose_prior_residual,
+    pose_prior_term,
     shape_prior_residual,
 )
 from pop_core.fitting.residuals import (
@@ -109,7 +109,7 @@ def test_conditional_prior(state: BodyState, person: BodyParameters) -> None:
 
 def test_pose_prior(state: BodyState) -> None:
     prior = load_pose_prior()
-    assert_is_derivative(lambda s, j: pose_prior_residual(s, prior, 1.0, jacobian=j), state)
+    assert_is_gradient(lambda s, j: pose_prior_term(s, prior, 0.7, jacobian=j), state)
 
 
 def test_limit_prior(state: BodyState) -> None:

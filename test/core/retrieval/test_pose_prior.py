@@ -1,16 +1,17 @@
 import numpy as np
 import pytest
 
-from pop_core.body.joint_limits import mirrored_pose, pose_coordinates
+from pop_core.body.joint_limits import TWIST_AXES, mirrored_pose, pose_coordinates
 from pop_core.errors import LibraryFileError
 from pop_core.geometry.rotation import from_rotvec, to_rotvec
+from pop_core.geometry.swing_twist import from_swing_twist
 from pop_core.retrieval.pose_prior import PosePrior, load_pose_prior
 
 
-def test_half_the_squared_residual_is_the_log_density_but_for_a_constant():
+def test_the_cost_is_the_log_density_of_the_likeliest_component_but_for_a_constant():
     prior = load_pose_prior()
     poses = prior.sample(np.random.default_rng(0), 40)
-    energy = np.array([0.5 * np.sum(prior.residual(pose)[0] ** 2) for pose in poses])
+    energy = np.array([prior.cost(pose) for pose in poses])
     cost = prior.component_costs(pose_coordinates(poses).reshape(40, -1)).min(axis=1)
     assert np.allclose(energy - cost, (energy - cost)[0], atol=1e-6)
 
@@ -27,19 +28,31 @@ def test_component_density_is_that_of_its_covariance():
     assert np.isclose(found, expected)
 
 
-def test_jacobian_agrees_with_central_differences():
+def test_gradient_agrees_with_central_differences():
     prior = load_pose_prior()
     for pose in prior.sample(np.random.default_rng(2), 3):
-        R = from_rotvec(pose)
-        _, jacobian = prior.residual(pose)
+        cost, gradient, _ = prior.quadratic(pose)
+        assert np.isclose(cost, prior.cost(pose))
         for column in range(0, 69, 5):
             delta = np.zeros(69)
             delta[column] = 1e-6
-            both = [
-                prior.residual(to_rotvec(from_rotvec(sign * delta.reshape(23, 3)) @ R))[0]
-                for sign in (1, -1)
-            ]
-            assert np.allclose(jacobian[:, column], (both[0] - both[1]) / 2e-6, atol=1e-4)
+            ahead, behind = (prior.cost(turned(pose, sign * delta)) for sign in (1, -1))
+            assert np.isclose(gradient[column], (ahead - behind) / 2e-6, atol=1e-3)
+
+
+def test_the_hessian_bends_the_cost_at_the_middle_of_a_component():
+    prior = load_pose_prior()
+    middle = from_swing_twist(prior.means[0].reshape(23, 3), TWIST_AXES)
+    cost, gradient, hessian = prior.quadratic(middle)
+    assert np.allclose(gradient, 0.0, atol=1e-6)
+    for seed in range(5):
+        delta = 1e-4 * np.random.default_rng(seed).normal(size=69)
+        around = (prior.cost(turned(middle, delta)) + prior.cost(turned(middle, -delta))) / 2
+        assert np.isclose(around - cost, 0.5 * delta @ hessian @ delta, rtol=1e-3)
+
+
+def turned(pose: np.ndarray, delta: np.ndarray) -> np.ndarray:
+    return to_rotvec(from_rotvec(delta.reshape(23, 3)) @ from_rotvec(pose))
 
 
 def test_samples_have_the_moments_of_their_component():

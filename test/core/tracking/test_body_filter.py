@@ -29,10 +29,12 @@ def measured(
     model: BodyModel, predicted: FilterState, truth: BodyParameters, information: np.ndarray
 ) -> FilterState:
     """The update by a linear measurement of all parameters."""
-    gain = inverse(inverse(predicted.covariance) + information) @ information
+    before = inverse(predicted.covariance)
+    gain = inverse(before + information) @ information
     step = gain @ difference(truth, predicted.parameters)
     skeleton = pose_skeleton(model, predicted.parameters)
-    return update(predicted, increment(predicted.parameters, step, skeleton), information)
+    fitted = increment(predicted.parameters, step, skeleton)
+    return update(predicted, fitted, before, information)
 
 
 def is_positive(matrix: np.ndarray) -> bool:

@@ -1,7 +1,8 @@
-"""The prediction as a residual: zero where it is, whitened, with the derivative it claims."""
+"""The prediction as a term: no cost where it is, half by a sigma, derivatives as claimed."""
 
 import numpy as np
 import pytest
+from support.derivatives import assert_is_gradient
 
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.fitting.body_state import BodyState, FitBody
@@ -21,7 +22,7 @@ def test_nothing_pulls_a_body_that_is_where_it_was_predicted(
     prediction: tuple[Prediction, BodyState]
 ) -> None:
     predicted, here = prediction
-    np.testing.assert_allclose(predicted.residual(here, jacobian=False).r, 0.0, atol=1e-6)
+    assert predicted.term(here, jacobian=False).cost == pytest.approx(0.0, abs=1e-9)
 
 
 def test_one_standard_deviation_costs_half(prediction: tuple[Prediction, BodyState]) -> None:
@@ -29,23 +30,21 @@ def test_one_standard_deviation_costs_half(prediction: tuple[Prediction, BodySta
     step = np.zeros(here.body.size)
     # Along one parameter alone, what the others would do is not given away.
     step[0] = 1 / np.sqrt(predicted.information[0, 0])
-    r = predicted.residual(here.moved(step), jacobian=False).r
-    assert 0.5 * r @ r == pytest.approx(0.5)
+    assert predicted.term(here.moved(step), jacobian=False).cost == pytest.approx(0.5)
 
 
-def test_the_jacobian_is_the_derivative(prediction: tuple[Prediction, BodyState]) -> None:
+def test_the_gradient_is_the_derivative(prediction: tuple[Prediction, BodyState]) -> None:
     predicted, here = prediction
-    rng = np.random.default_rng(2)
-    away = here.moved(0.2 * rng.normal(size=here.body.size))
-    J = predicted.residual(away, jacobian=True).J
-    assert J is not None
-    direction = rng.normal(size=here.body.size)
-    small = 1e-6
-    plus, minus = (
-        predicted.residual(away.moved(sign * small * direction), jacobian=False).r
-        for sign in (1, -1))
+    away = here.moved(0.2 * np.random.default_rng(2).normal(size=here.body.size))
+    assert_is_gradient(lambda s, j: predicted.term(s, jacobian=j), away)
+
+
+def test_the_hessian_is_the_information_where_the_body_was_predicted(
+    prediction: tuple[Prediction, BodyState]
+) -> None:
+    predicted, here = prediction
     np.testing.assert_allclose(
-        J @ direction, (plus - minus) / (2 * small), rtol=1e-4, atol=1e-4)
+        predicted.term(here, jacobian=True).hessian, predicted.information, rtol=1e-6, atol=1e-6)
 
 
 def test_a_joint_at_the_end_of_a_limb_is_the_least_certain(
