@@ -108,10 +108,10 @@ def assemble(blocks: Sequence[Term], size: int) -> NormalEquations:
     # dsyrk forms one triangle only, half the work of a product; once, not block by block.
     upper = blas.dsyrk(1.0, J.T, lower=0) if count else np.zeros((size, size))
     gradient, hessian = J.T @ r, with_lower(upper)
-    for block in blocks:
-        if isinstance(block, Quadratic) and block.gradient is not None:
-            gradient += block.gradient
-            hessian += block.hessian
+    for model in blocks:
+        if isinstance(model, Quadratic) and model.gradient is not None:
+            gradient += model.gradient
+            hessian += model.hessian
     return NormalEquations(cost_of(blocks), gradient, hessian)
 
 

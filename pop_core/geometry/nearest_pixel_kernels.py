@@ -38,7 +38,8 @@ def nearest_pixel(row, y, x, reach):
 
     Args:
         row: What `nearest_rows` returned.
-        y, x: The pixel.
+        y: Row of the pixel.
+        x: Column of it.
         reach: How far to look [px].
     """
     w = row.shape[1]

@@ -51,9 +51,10 @@ def segment_body(
         config: Thresholds.
     """
     out = np.zeros(depth_m.shape, dtype=bool)
-    images = map(np.ascontiguousarray, (depth_m, rendered.depth_m, own))
     growth_kernels.segment(
-        *images, config.gamma_m, config.tolerance_m, config.growth_m * focal_px, NEAREST_M, out)
+        np.ascontiguousarray(depth_m), np.ascontiguousarray(rendered.depth_m),
+        np.ascontiguousarray(own), config.gamma_m, config.tolerance_m,
+        config.growth_m * focal_px, NEAREST_M, out)
     return out
 
 

@@ -17,7 +17,10 @@ def claimed_shares(points, limb, sigma, alone, before, rim, fx, fy, cx, cy):
         alone: (p,h,w) depth image of each part alone [m], +inf where it is not.
         before: (limbs,p) which parts are surer than each limb.
         rim: How many pixels around its image a part explains.
-        fx, fy, cx, cy: Pinhole of the images.
+        fx: Focal length across of the images [px].
+        fy: The same down.
+        cx: Column of their principal point [px].
+        cy: Row of it.
     """
     parts, h, w = alone.shape
     share = np.empty(points.shape[0])
