@@ -1,4 +1,4 @@
-"""Anatomical limits of the 23 joints in swing-twist coordinates [rad], and their hinge residual.
+"""Anatomical limits of the 23 joints in swing-twist coordinates [rad], and what exceeds them.
 
 T-pose rest, y up, facing +z, the person's left is +x. The bounds are generous: they hold the
 ranges of healthy adults (Kapandji 1982; Boone and Azen 1979) plus what clothes, soft spines and
@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pop_core.body.joints import JOINT_NAMES, MIRROR
-from pop_core.geometry.swing_twist import swing_twist_jacobian, to_swing_twist
+from pop_core.geometry.swing_twist import to_swing_twist
 
 # Joint without side: twist axis, then lower and upper bounds about x, y, z of the left joint.
 _TABLE = {
@@ -60,25 +60,6 @@ def mirrored_pose(body_pose: Float[np.ndarray, '*n 23 3']) -> Float[np.ndarray, 
     return np.asarray(body_pose[..., BODY_MIRROR, :] * signs)
 
 
-def limit_residual(
-    body_pose: Float[np.ndarray, '23 3'],
-) -> tuple[Float[np.ndarray, '69'], Float[np.ndarray, '69 69']]:
-    """Return how far each coordinate lies beyond its limits.
-
-    Returns:
-        Signed excess r [rad], zero within the limits, and dr/d(delta) for left increments
-        R_j <- exp(delta_j) R_j of the 23 joints.
-    """
-    c = pose_coordinates(body_pose)
-    r = np.maximum(c - UPPER, 0.0) + np.minimum(c - LOWER, 0.0)
-    blocks = swing_twist_jacobian(c, TWIST_AXES) * (r != 0.0)[:, :, None]
-    return r.reshape(-1), block_diagonal(blocks)
-
-
-def block_diagonal(blocks: Float[np.ndarray, 'j 3 3']) -> Float[np.ndarray, 'x x']:
-    """Return one square matrix with the 3x3 blocks on its diagonal."""
-    n = len(blocks)
-    out = np.zeros((n, 3, n, 3))
-    index = np.arange(n)
-    out[index, :, index, :] = blocks
-    return out.reshape(3 * n, 3 * n)
+def limit_excess(coordinates: Float[np.ndarray, '23 3']) -> Float[np.ndarray, '23 3']:
+    """Return the signed excess [rad] of each coordinate beyond its limits, zero within them."""
+    return np.maximum(coordinates - UPPER, 0.0) + np.minimum(coordinates - LOWER, 0.0)

@@ -61,9 +61,9 @@ def attached_places(
     points: AttachedPoints, skeleton: PosedSkeleton, betas: Float[np.ndarray, 'b']
 ) -> Float[np.ndarray, 'n 3']:
     """Return points carried by joints of a posed tree [m], before scale and translation."""
-    rest = points.template + points.shapedirs @ betas
-    arm = rest - skeleton.rest_joints[points.joint]
-    return skeleton.p[points.joint] + np.einsum('nrc,nc->nr', skeleton.G[points.joint], arm)
+    return np.asarray(kernels.attached_places(
+        points.joint, points.template + points.shapedirs @ betas, skeleton.rest_joints,
+        skeleton.G, skeleton.p))
 
 
 def attached_jacobian(

@@ -61,6 +61,19 @@ def joint_shape_derivatives(G, joint_shapedirs, parents):
 
 
 @njit(cache=True, nogil=True)
+def attached_places(joint, rest, rest_joints, G, p):
+    """Return where points (n,3) that hang on joints (n) at rest are in a posed tree [m]."""
+    out = np.empty(rest.shape)
+    for i in range(rest.shape[0]):
+        j = joint[i]
+        for r in range(3):
+            out[i, r] = p[j, r]
+            for c in range(3):
+                out[i, r] += G[j, r, c] * (rest[i, c] - rest_joints[j, c])
+    return out
+
+
+@njit(cache=True, nogil=True)
 def skin(v_shaped, bone_ids, bone_weights, G, p, rest_joints, scale, transl):
     """Return skinned vertices (n,3) [m] of shaped rest vertices (n,3)."""
     n, influences = bone_ids.shape

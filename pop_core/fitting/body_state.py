@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pop_core.body.capsules import BodyCapsules, body_capsules
+from pop_core.body.joint_limits import pose_coordinates
 from pop_core.body.joints import JOINT_INDEX
 from pop_core.body.kinematics import (
     PosedSkeleton,
@@ -73,6 +74,11 @@ class BodyState:
     def skeleton(self) -> PosedSkeleton:
         """Return the posed tree."""
         return pose_skeleton(self.body.model, self.parameters)
+
+    @cached_property
+    def coordinates(self) -> Float[np.ndarray, '23 3']:
+        """Return the swing-twist coordinates of the pose [rad]."""
+        return pose_coordinates(self.parameters.body_pose)
 
     @cached_property
     def vertices(self) -> Float[np.ndarray, 'n 3']:

@@ -17,7 +17,7 @@ from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import Pairs, join_pairs
 from pop_core.fitting.robust_loss import geman_mcclure_weight
-from pop_core.fitting.sight_kernels import see
+from pop_core.fitting.sight_kernels import mean_misfit, see
 from pop_core.geometry.nearest_pixel_kernels import nearest_pixels, nearest_rows
 from pop_core.rendering.depth_renderer import RenderedDepth, render_depth
 
@@ -160,13 +160,7 @@ def depth_energy(
         segment: The person's pixels, the same for every hypothesis that is compared.
         limit_m: Truncation of a pixel's cost [m].
     """
-    body, measured = rendered.depth_m, observation.depth_m
-    rest = np.where(segment, np.float32(np.inf), measured)
-    with np.errstate(invalid='ignore'):
-        # NaN (no measurement) can hide anything, so it costs nothing.
-        error = np.abs(np.minimum(body, rest) - measured)
-    error = np.minimum(np.where(np.isnan(measured), 0.0, error), limit_m)
-    return float(error.sum() / max(int(segment.sum()), 1))
+    return float(mean_misfit(rendered.depth_m, observation.depth_m, segment, limit_m))
 
 
 def free_space_violation(

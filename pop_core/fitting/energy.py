@@ -11,11 +11,11 @@ from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.levenberg_marquardt import Term
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.priors import (
-    conditional_prior_residual,
-    limit_prior_residual,
+    conditional_prior_term,
+    limit_prior_term,
     pose_prior_term,
     scale_weight,
-    shape_prior_residual,
+    shape_prior_term,
 )
 from pop_core.fitting.residuals import (
     Pairs,
@@ -98,10 +98,10 @@ class BodyEnergy:
             joint_residual(state, lifted, self.joint_weight, jacobian=jacobian),
             ray_residual(state, rays, self.ray_weight, jacobian=jacobian),
             pose_prior_term(state, belief.prior, weights.prior, jacobian=jacobian),
-            conditional_prior_residual(
+            conditional_prior_term(
                 state, belief.pose, belief.sigma_rad, weights.neighbours, jacobian=jacobian),
-            limit_prior_residual(state, jacobian=jacobian),
-            shape_prior_residual(state, self.scale_weight, jacobian=jacobian),
+            limit_prior_term(state, jacobian=jacobian),
+            shape_prior_term(state, self.scale_weight),
             collision_residual(state, weights.collision, jacobian=jacobian),
         ]
         if self.pairs is not None and len(self.pairs.vertex):

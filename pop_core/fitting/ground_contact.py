@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from pop_core.body.joints import JOINT_INDEX, SHARED_INDEX
 from pop_core.fitting.body_state import BodyState
-from pop_core.fitting.residuals import Pairs, join_pairs
+from pop_core.fitting.residuals import Pairs
 from pop_core.fitting.robust_loss import Kernel, geman_mcclure_weight
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.segmentation.ground import Ground
@@ -42,18 +42,18 @@ def ground_pairs(
     below = np.flatnonzero(height < -TOLERANCE_M)
     # Meshes of any density push alike.
     weight = np.full(len(below), 100.0 / len(height) / BELOW_SIGMA_M**2)
-    parts = [onto_plane(state, below, ground, weight)]
+    vertices, weights = [below], [weight]
     contact = [height[sole].mean() for sole in state.body.soles]
-    upright = np.clip(2.0 * uprightness(state, ground) - 0.5, 0.0, 1.0)
+    upright = min(max(2.0 * uprightness(state, ground) - 0.5, 0.0), 1.0)
     for ankle, sole, foot_height in zip(ANKLES, state.body.soles, contact, strict=True):
         if lifted.lifted[ankle]:
             continue
         # One foot carries the person; the other may be in the air.
         carries = 1.0 if foot_height <= min(contact) else 0.3
         worth = 4.0 * upright * carries / CONTACT_SIGMA_M**2 / len(sole)
-        weight = worth * kernel(height[sole], CONTACT_SCALE_M)
-        parts.append(onto_plane(state, sole, ground, weight))
-    return join_pairs(parts)
+        vertices.append(sole)
+        weights.append(worth * kernel(height[sole], CONTACT_SCALE_M))
+    return onto_plane(state, np.concatenate(vertices), ground, np.concatenate(weights))
 
 
 def uprightness(state: BodyState, ground: Ground) -> float:
@@ -71,4 +71,4 @@ def onto_plane(
     """Return pairs that draw vertices onto a plane, along its normal."""
     points = state.vertices[vertex]
     target = points - plane.height(points)[:, None] * plane.normal
-    return Pairs(vertex, np.tile(plane.normal, (len(vertex), 1)), target, weight)
+    return Pairs(vertex, np.broadcast_to(plane.normal, target.shape), target, weight)

@@ -49,14 +49,16 @@ class Quadratic:
 
     Args:
         cost: What it costs.
-        gradient: Derivative of the cost with respect to the step, or None when only the cost is
-            wanted.
-        hessian: J'WJ, as Gauss and Newton have it, or None.
+        gradient: Derivative of the cost with respect to the parameters it is of, or None when only
+            the cost is wanted.
+        hessian: J'WJ of those parameters, as Gauss and Newton have it, or None.
+        first: Where these begin among all parameters.
     """
 
     cost: float
-    gradient: Float[np.ndarray, 'x'] | None = None
-    hessian: Float[np.ndarray, 'x x'] | None = None
+    gradient: Float[np.ndarray, 'y'] | None = None
+    hessian: Float[np.ndarray, 'y y'] | None = None
+    first: int = 0
 
 
 Term = Residual | Quadratic
@@ -110,8 +112,9 @@ def assemble(blocks: Sequence[Term], size: int) -> NormalEquations:
     gradient, hessian = J.T @ r, with_lower(upper)
     for model in blocks:
         if isinstance(model, Quadratic) and model.gradient is not None:
-            gradient += model.gradient
-            hessian += model.hessian
+            own = slice(model.first, model.first + len(model.gradient))
+            gradient[own] += model.gradient
+            hessian[own, own] += model.hessian
     return NormalEquations(cost_of(blocks), gradient, hessian)
 
 
@@ -130,10 +133,10 @@ def damped_step(
     Raises:
         np.linalg.LinAlgError: If the damped Hessian is not positive definite.
     """
-    free = np.flatnonzero(active)
-    hessian = equations.hessian[np.ix_(free, free)]
+    free = slice(None) if active.all() else np.flatnonzero(active)
+    hessian = equations.hessian[free][:, free].copy()
     # Damping relative to the diagonal makes the step independent of units (Marquardt 1963).
-    hessian[np.diag_indices(len(free))] += damping * (np.diag(hessian) + 1e-9)
+    hessian[np.diag_indices(len(hessian))] += damping * (np.diag(hessian) + 1e-9)
     step = np.zeros(len(equations.gradient))
     # Cholesky: symmetric positive definite by construction.
     factor, failed = lapack.dpotrf(hessian, overwrite_a=1)

@@ -11,11 +11,12 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from pop_core.body.joint_limits import limit_residual
-from pop_core.fitting.body_state import BODY_POSE, BodyState, betas_slice
-from pop_core.fitting.levenberg_marquardt import Quadratic, Residual, no_residual
+from pop_core.body.joint_limits import TWIST_AXES, limit_excess
+from pop_core.fitting.body_state import BODY_POSE, BodyState
+from pop_core.fitting.levenberg_marquardt import Quadratic
 from pop_core.fitting.robust_loss import Kernel
 from pop_core.geometry.rotation import from_rotvec, left_jacobian_inverse, to_rotvec
+from pop_core.geometry.swing_twist import swing_twist_jacobian
 from pop_core.retrieval.candidate import PoseCandidate
 from pop_core.retrieval.pose_prior import PosePrior
 
@@ -28,22 +29,19 @@ def pose_prior_term(
     state: BodyState, prior: PosePrior, weight: float, *, jacobian: bool
 ) -> Quadratic:
     """Return the squared distance to the nearest component of the pose prior."""
-    pose = state.parameters.body_pose
     if not jacobian:
-        return Quadratic(weight * prior.cost(pose))
-    cost, of_pose, curvature = prior.quadratic(pose)
-    gradient, hessian = np.zeros(state.body.size), np.zeros((state.body.size, state.body.size))
-    gradient[BODY_POSE] = weight * of_pose
-    hessian[BODY_POSE, BODY_POSE] = weight * curvature
-    return Quadratic(weight * cost, gradient, hessian)
+        return Quadratic(weight * prior.cost(state.coordinates))
+    cost, gradient, hessian = prior.quadratic(state.coordinates)
+    return Quadratic(weight * cost, weight * gradient, weight * hessian, BODY_POSE.start)
 
 
-def limit_prior_residual(state: BodyState, *, jacobian: bool) -> Residual:
-    """Return by how much joints exceed their anatomical limits [rad]."""
-    r, J = limit_residual(state.parameters.body_pose)
-    beyond = r != 0.0
-    weight = np.full(int(beyond.sum()), 1 / LIMIT_SIGMA_RAD**2)
-    return Residual(r[beyond], _at(state, J[beyond], BODY_POSE) if jacobian else None, weight)
+def limit_prior_term(state: BodyState, *, jacobian: bool) -> Quadratic:
+    """Return by how much joints exceed their anatomical limits."""
+    r = limit_excess(state.coordinates)
+    if not jacobian or not r.any():
+        return Quadratic(0.5 * float(np.sum(r * r)) / LIMIT_SIGMA_RAD**2)
+    J = swing_twist_jacobian(state.coordinates, TWIST_AXES) * (r != 0.0)[:, :, None]
+    return _of_joints(r, J, 1 / LIMIT_SIGMA_RAD**2)
 
 
 def neighbour_sigma_rad(
@@ -62,27 +60,22 @@ def neighbour_sigma_rad(
     return np.clip(spread, low, high)
 
 
-def conditional_prior_residual(
+def conditional_prior_term(
     state: BodyState,
     pose: Float[np.ndarray, '23 3'],
     sigma_rad: Float[np.ndarray, '23'],
     weight: float,
     *,
     jacobian: bool,
-) -> Residual:
+) -> Quadratic:
     """Return the rotation from the retrieved pose, in units of the neighbours' spread."""
     if weight == 0.0:
-        return no_residual(state.body.size)
-    R = state.skeleton.R_local[1:]
-    turn = to_rotvec(R @ from_rotvec(pose).transpose(0, 2, 1))
-    r = (turn / sigma_rad[:, None]).reshape(-1)
-    J = None
-    if jacobian:
-        blocks = left_jacobian_inverse(turn) / sigma_rad[:, None, None]
-        J = np.zeros((69, state.body.size))
-        for j, block in enumerate(blocks):
-            J[3 * j: 3 * j + 3, 6 + 3 * j: 9 + 3 * j] = block
-    return Residual(r, J, np.full(69, weight))
+        return Quadratic(0.0)
+    turn = to_rotvec(state.skeleton.R_local[1:] @ from_rotvec(pose).transpose(0, 2, 1))
+    r = turn / sigma_rad[:, None]
+    if not jacobian:
+        return Quadratic(0.5 * weight * float(np.sum(r * r)))
+    return _of_joints(r, left_jacobian_inverse(turn) / sigma_rad[:, None, None], weight)
 
 
 def scale_weight(state: BodyState, kernel: Kernel) -> float:
@@ -91,26 +84,29 @@ def scale_weight(state: BodyState, kernel: Kernel) -> float:
     return float(kernel(np.array([deviation]), SCALE_TAIL)[0])
 
 
-def shape_prior_residual(state: BodyState, of_scale: float, *, jacobian: bool) -> Residual:
+def shape_prior_term(state: BodyState, of_scale: float) -> Quadratic:
     """Return betas in standard deviations and the log scale in units of its sigma.
 
     Args:
         state: Body.
         of_scale: Weight of the scale.
-        jacobian: Whether derivatives are wanted.
     """
-    parameters, size = state.parameters, state.body.size
-    n = len(parameters.betas)
-    r = np.append(parameters.betas, np.log(parameters.scale) / SCALE_SIGMA)
-    J = None
-    if jacobian:
-        J = np.zeros((n + 1, size))
-        J[:n, betas_slice(n)] = np.eye(n)
-        J[n, -1] = 1 / SCALE_SIGMA
-    return Residual(r, J, np.append(np.ones(n), of_scale))
+    parameters = state.parameters
+    weight = np.append(np.ones(len(parameters.betas)), of_scale / SCALE_SIGMA**2)
+    at = np.append(parameters.betas, np.log(parameters.scale))
+    pull = weight * at
+    return Quadratic(
+        0.5 * float(at @ pull), pull, np.diag(weight), BODY_POSE.stop)
 
 
-def _at(state: BodyState, J: Float[np.ndarray, 'n m'], columns: slice) -> Float[np.ndarray, 'n x']:
-    out = np.zeros((len(J), state.body.size))
-    out[:, columns] = J
-    return out
+def _of_joints(
+    r: Float[np.ndarray, '23 3'], J: Float[np.ndarray, '23 3 3'], weight: float
+) -> Quadratic:
+    """Return the term of residuals that depend on the rotation of one joint each."""
+    gradient = weight * np.einsum('jab,ja->jb', J, r).reshape(-1)
+    hessian = np.zeros((len(r), 3, len(r), 3))
+    joint = np.arange(len(r))
+    hessian[joint, :, joint, :] = weight * (J.transpose(0, 2, 1) @ J)
+    return Quadratic(
+        0.5 * weight * float(np.sum(r * r)), gradient, hessian.reshape(r.size, r.size),
+        BODY_POSE.start)

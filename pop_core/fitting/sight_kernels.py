@@ -1,4 +1,4 @@
-"""Numba kernel of the sight of vertices: each is compared with the depth measured at its pixel."""
+"""Numba kernels that compare a body, its vertices or its image, with the measured depth."""
 
 from __future__ import annotations
 
@@ -44,3 +44,21 @@ def see(
             sight[i] = CONTRADICTED
         else:
             sight[i] = VISIBLE
+
+
+@njit(cache=True, nogil=True)
+def mean_misfit(body, measured, segment, limit):
+    """Return E_depth [m] of a body (see `depth_energy`): the error of pixels per segment pixel."""
+    total, count = 0.0, 0
+    h, w = measured.shape
+    for y in range(h):
+        for x in range(w):
+            depth = measured[y, x]
+            count += segment[y, x]
+            if np.isnan(depth):
+                continue  # what was not measured can hide anything, so it costs nothing
+            if segment[y, x]:
+                total += min(abs(body[y, x] - depth), limit)
+            elif body[y, x] < depth:
+                total += min(depth - body[y, x], limit)
+    return total / max(count, 1)

@@ -86,23 +86,21 @@ class PosePrior:
         c = pose_coordinates(body_pose).reshape(len(body_pose), -1)
         return np.asarray(np.logaddexp.reduce(-self.component_costs(c), axis=1))
 
-    def cost(self, body_pose: Float[np.ndarray, '23 3']) -> float:
-        """Return -log p of the most likely component, but for a constant: never below zero.
+    def cost(self, c: Float[np.ndarray, '23 3']) -> float:
+        """Return -log p of the most likely component at coordinates c [rad], but for a constant.
 
         What the component's weight and volume cost above the cheapest component is part of it, so
-        that the energy does not jump when another component takes over.
+        that the energy does not jump when another component takes over. It is never below zero.
         """
-        c = pose_coordinates(body_pose).reshape(1, -1)
-        return float(self.component_costs(c).min() - self.peak_costs.min())
+        return float(self.component_costs(c.reshape(1, -1)).min() - self.peak_costs.min())
 
     def quadratic(
-        self, body_pose: Float[np.ndarray, '23 3']
+        self, c: Float[np.ndarray, '23 3']
     ) -> tuple[float, Float[np.ndarray, '69'], Float[np.ndarray, '69 69']]:
         """Return `cost` with its gradient and Gauss-Newton Hessian.
 
         Derivatives are with respect to left increments R_j <- exp(delta_j) R_j of the 23 joints.
         """
-        c = pose_coordinates(body_pose)
         costs = self.component_costs(c.reshape(1, -1))[0]
         best = int(np.argmin(costs))
         turn = swing_twist_jacobian(c, TWIST_AXES)

@@ -18,7 +18,7 @@ from pop_core.fitting.energy import (
 )
 from pop_core.fitting.levenberg_marquardt import Quadratic, Residual, Term, assemble
 from pop_core.fitting.observation import Observation
-from pop_core.fitting.priors import limit_prior_residual, pose_prior_term
+from pop_core.fitting.priors import limit_prior_term, pose_prior_term
 from pop_core.fitting.robust_loss import geman_mcclure_weight
 from pop_core.geometry.block_kernels import sandwich
 from pop_core.geometry.rotation import left_jacobian_inverse
@@ -112,7 +112,7 @@ def prior_curvature(
     """Return J'WJ of what is believed of any pose."""
     blocks: list[Term] = [
         pose_prior_term(state, prior, weight, jacobian=True),
-        limit_prior_residual(state, jacobian=True)]
+        limit_prior_term(state, jacobian=True)]
     return assemble(blocks, state.body.size).hessian
 
 

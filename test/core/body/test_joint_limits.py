@@ -5,12 +5,11 @@ from pop_core.body.joint_limits import (
     LOWER,
     TWIST_AXES,
     UPPER,
-    limit_residual,
+    limit_excess,
     mirrored_pose,
     pose_coordinates,
 )
 from pop_core.body.joints import JOINT_INDEX
-from pop_core.geometry.rotation import from_rotvec, to_rotvec
 from pop_core.geometry.swing_twist import from_swing_twist
 
 
@@ -20,32 +19,34 @@ def pose_with(name: str, rotvec: list[float]) -> np.ndarray:
     return pose
 
 
+def excess(pose: np.ndarray) -> np.ndarray:
+    return limit_excess(pose_coordinates(pose))
+
+
 def test_poses_within_the_limits_cost_nothing():
     rng = np.random.default_rng(0)
     for _ in range(20):
         c = LOWER + (UPPER - LOWER) * rng.uniform(0.02, 0.98, (23, 3))
-        r, jacobian = limit_residual(from_swing_twist(c, TWIST_AXES))
-        assert not r.any()
-        assert not jacobian.any()
+        assert not excess(from_swing_twist(c, TWIST_AXES)).any()
 
 
 def test_knee_may_bend_back_and_not_forward():
-    assert not limit_residual(pose_with('left_knee', [1.8, 0, 0]))[0].any()
-    assert limit_residual(pose_with('left_knee', [-0.8, 0, 0]))[0].any()
+    assert not excess(pose_with('left_knee', [1.8, 0, 0])).any()
+    assert excess(pose_with('left_knee', [-0.8, 0, 0])).any()
 
 
 def test_elbows_may_bend_forward_and_not_back():
     for name, sign in (('left_elbow', -1), ('right_elbow', 1)):
-        assert not limit_residual(pose_with(name, [0, sign * 2.0, 0]))[0].any()
-        assert limit_residual(pose_with(name, [0, -sign * 0.8, 0]))[0].any()
+        assert not excess(pose_with(name, [0, sign * 2.0, 0])).any()
+        assert excess(pose_with(name, [0, -sign * 0.8, 0])).any()
 
 
 def test_limits_are_their_own_mirror():
     rng = np.random.default_rng(1)
     pose = rng.normal(size=(23, 3)) * 0.8
-    cost = np.sum(limit_residual(pose)[0] ** 2)
+    cost = np.sum(excess(pose) ** 2)
     assert cost > 0
-    assert np.isclose(np.sum(limit_residual(mirrored_pose(pose))[0] ** 2), cost)
+    assert np.isclose(np.sum(excess(mirrored_pose(pose)) ** 2), cost)
 
 
 def test_mirror_twice_is_the_pose_itself():
@@ -58,28 +59,10 @@ def test_residual_is_the_signed_excess():
     c = np.clip(np.zeros((23, 3)), LOWER, UPPER)
     c[3, 0] = UPPER[3, 0] + 0.2
     c[17, 1] = LOWER[17, 1] - 0.1
-    r = limit_residual(from_swing_twist(c, TWIST_AXES))[0].reshape(23, 3)
+    r = excess(from_swing_twist(c, TWIST_AXES))
     assert np.isclose(r[3, 0], 0.2)
     assert np.isclose(r[17, 1], -0.1)
     assert np.count_nonzero(np.abs(r) > 1e-9) == 2
-
-
-def test_jacobian_agrees_with_central_differences():
-    rng = np.random.default_rng(3)
-    pose = from_swing_twist(
-        np.clip(rng.normal(size=(23, 3)) * 0.9, -1.6, 1.6), TWIST_AXES)
-    _, jacobian = limit_residual(pose)
-    R = from_rotvec(pose)
-    numeric = np.empty((69, 69))
-    for column in range(69):
-        delta = np.zeros(69)
-        delta[column] = 1e-6
-        both = [
-            limit_residual(to_rotvec(from_rotvec(sign * delta.reshape(23, 3)) @ R))[0]
-            for sign in (1, -1)
-        ]
-        numeric[:, column] = (both[0] - both[1]) / 2e-6
-    assert np.allclose(jacobian, numeric, atol=1e-5)
 
 
 def test_coordinates_of_rest_are_zero():

@@ -10,10 +10,10 @@ from pop_core.fitting.body_state import BodyState, FitBody
 from pop_core.fitting.levenberg_marquardt import assemble, cost_of
 from pop_core.fitting.observation import keypoint_rays
 from pop_core.fitting.priors import (
-    conditional_prior_residual,
-    limit_prior_residual,
+    conditional_prior_term,
+    limit_prior_term,
     pose_prior_term,
-    shape_prior_residual,
+    shape_prior_term,
 )
 from pop_core.fitting.residuals import (
     Pairs,
@@ -84,15 +84,13 @@ def test_no_pairs_merge_to_none() -> None:
 
 
 def test_a_term_without_weight_is_an_empty_block(
-    state: BodyState, person: BodyParameters, lifted: LiftedJoints
+    state: BodyState, lifted: LiftedJoints
 ) -> None:
-    sigma = np.full(23, 0.3)
     rays = keypoint_rays(lifted, CAMERA)
     assert len(rays.joint) == 0
     for block in (
         joint_residual(state, lifted, np.zeros(15), jacobian=True),
         ray_residual(state, rays, np.zeros(15), jacobian=True),
-        conditional_prior_residual(state, person.body_pose, sigma, 0.0, jacobian=True),
         collision_residual(state, 0.0, jacobian=True),
     ):
         assert len(block.r) == 0
@@ -102,9 +100,9 @@ def test_a_term_without_weight_is_an_empty_block(
 
 def test_conditional_prior(state: BodyState, person: BodyParameters) -> None:
     sigma = np.linspace(0.2, 0.9, 23)
-    assert_is_derivative(
-        lambda s, j: conditional_prior_residual(s, person.body_pose, sigma, 1.0, jacobian=j),
-        state)
+    assert_is_gradient(
+        lambda s, j: conditional_prior_term(s, person.body_pose, sigma, 1.0, jacobian=j), state)
+    assert conditional_prior_term(state, person.body_pose, sigma, 0.0, jacobian=True).cost == 0.0
 
 
 def test_pose_prior(state: BodyState) -> None:
@@ -113,11 +111,11 @@ def test_pose_prior(state: BodyState) -> None:
 
 
 def test_limit_prior(state: BodyState) -> None:
-    assert_is_derivative(lambda s, j: limit_prior_residual(s, jacobian=j), state)
+    assert_is_gradient(lambda s, j: limit_prior_term(s, jacobian=j), state)
 
 
 def test_shape_prior(state: BodyState) -> None:
-    assert_is_derivative(lambda s, j: shape_prior_residual(s, 0.3, jacobian=j), state)
+    assert_is_gradient(lambda s, _: shape_prior_term(s, 0.3), state)
 
 
 def test_joint_term_vanishes_at_the_lifted_joints(

@@ -10,10 +10,10 @@ from pop_core.body.model import BodyModel, rest_parameters
 from pop_core.fitting.body_state import BodyState, FitBody
 from pop_core.fitting.levenberg_marquardt import (
     FIRST_DAMPING,
-    Residual,
+    Term,
     levenberg_marquardt_step,
 )
-from pop_core.fitting.priors import conditional_prior_residual
+from pop_core.fitting.priors import conditional_prior_term
 from pop_core.fitting.self_collision import collision_residual, find_overlaps
 from pop_core.synthesis.poses import POSE_KINDS, draw_pose
 
@@ -90,10 +90,10 @@ def test_an_arm_in_the_belly_comes_out(prepared: FitBody) -> None:
     active = np.zeros(prepared.size, dtype=bool)
     active[6:75] = True
 
-    def evaluate(at: BodyState, jacobian: bool) -> list[Residual]:
+    def evaluate(at: BodyState, jacobian: bool) -> list[Term]:
         return [
             collision_residual(at, 1.0, jacobian=jacobian),
-            conditional_prior_residual(at, start, np.ones(23), 0.1, jacobian=jacobian)]
+            conditional_prior_term(at, start, np.ones(23), 0.1, jacobian=jacobian)]
 
     for _ in range(10):
         report = levenberg_marquardt_step(state, evaluate, BodyState.moved, active, damping)
