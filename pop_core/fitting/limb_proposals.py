@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float
 from pop_core.fitting.depth_consistency import CLOTHES_M, DEPTH_LIMIT_M
 from pop_core.fitting.energy import TermWeights
 from pop_core.fitting.hypotheses import DEPTH_SCORE, Hypothesis
+from pop_core.fitting.limb_kernels import bone_misfits
 from pop_core.fitting.limb_points import KINDS, LimbKind, LimbPoints, limb_points
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import RAY_SCALE_M
@@ -126,24 +127,16 @@ def _depth_cost(
     A point before the measured surface costs its gap, one on surface that nothing else explains
     saves what is unexplained, one that is hidden costs nothing; below the floor nothing hides.
     """
-    n, p = ways.points.shape[:2]
-    flat = ways.points.reshape(-1, 3)
-    measured, uv = observation.depth_at(flat)
-    gap = (measured - flat[:, 2]).reshape(n, p) + ways.width_m / 2
-    known = np.isfinite(gap)
-    gap = np.where(known, gap, 0.0)
-    depth = np.maximum(ways.points[..., 2], 0.3)
-    margin = CLOTHES_M + 0.01 + 2 * observation.noise.sigma_m(depth)
-    wrong = np.clip((gap - margin) / DEPTH_LIMIT_M, 0.0, 1.0)
-    if observation.ground is not None:
-        below = -observation.ground.height(flat).reshape(n, p)
-        wrong += np.clip((below - 0.02) / DEPTH_LIMIT_M, 0.0, 1.0)
-    u, v = np.clip(uv, 0, np.array(unexplained.shape[::-1]) - 1).T.reshape(2, n, p)
-    met = np.clip(1.0 - np.abs(gap) / (margin + CLOTHES_M), 0.0, 1.0)
-    right = np.where(known & unexplained[v, u], met, 0.0)
-    area_px = ways.length_m * ways.width_m * (observation.camera.fx / depth) ** 2
-    price = DEPTH_SCORE * DEPTH_LIMIT_M * area_px / segment_px
-    return np.asarray((price * (wrong - right)).sum(axis=1))
+    ground, camera = observation.ground, observation.camera
+    margin_m = CLOTHES_M + 0.01 + 2 * observation.noise.sigma_m(ways.points[..., 2])
+    # Height above the floor, and everywhere above where none is seen.
+    floor = np.array([0.0, 0.0, 0.0, np.inf])
+    if ground is not None:
+        floor = np.append(ground.normal, ground.offset_m)
+    cost = bone_misfits(
+        ways.points, ways.width_m, ways.length_m, margin_m, observation.depth_m, unexplained,
+        camera.fx, camera.fy, camera.cx, camera.cy, floor, CLOTHES_M, DEPTH_LIMIT_M)
+    return np.asarray(DEPTH_SCORE * DEPTH_LIMIT_M / segment_px * cost)
 
 
 def _with_limb(
