@@ -65,13 +65,15 @@ class Live:
     def measure(self, seconds: float) -> Row:
         """Return what happened in some seconds."""
         self.listener.take()
-        cpu_s, started_s = self.process.cpu_s, time.monotonic()
+        cpu_s, started_s, sent = self.process.cpu_s, time.monotonic(), len(self.camera.sent_s)
         self.camera.run(seconds)
         wall_s = time.monotonic() - started_s
         latency_s, frames = self.listener.take()
         p50, p95 = np.percentile(latency_s, [50, 95]) * 1e3 if latency_s else (np.nan, np.nan)
         return {
-            'rate [Hz]': round(frames / wall_s, 1), 'p50 [ms]': round(float(p50)),
+            'rate [Hz]': round(frames / wall_s, 1),
+            'answered [%]': round(100 * frames / max(len(self.camera.sent_s) - sent, 1)),
+            'p50 [ms]': round(float(p50)),
             'p95 [ms]': round(float(p95)),
             'CPU [%]': round(100 * (self.process.cpu_s - cpu_s) / wall_s),
             'memory [MB]': round(self.process.memory_mb)}

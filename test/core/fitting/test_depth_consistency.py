@@ -103,6 +103,18 @@ def test_energy_and_violation_grow_when_the_body_steps_forward(
     assert violations[-1] > 0.9
 
 
+def test_the_energy_is_that_of_the_composed_depth_image() -> None:
+    rng = np.random.default_rng(5)
+    body, measured = rng.uniform(1.9, 2.2, (2, 30, 40)).astype(np.float32)
+    body[rng.random(body.shape) < 0.5] = np.inf
+    measured[rng.random(body.shape) < 0.1] = np.nan
+    segment = rng.random(body.shape) < 0.4
+    rest = np.where(segment, np.inf, measured)  # the scene without the person
+    error = np.minimum(np.abs(np.fmin(body, rest) - measured), 0.15)
+    assert sight_kernels.mean_misfit(body, measured, segment, 0.15) == pytest.approx(
+        np.nansum(error) / segment.sum(), rel=1e-5)
+
+
 def test_missing_depth_contradicts_nothing(body: BodyModel, person: BodyParameters) -> None:
     frame = photograph(body, person)
     nothing = RgbdFrame(frame.rgb, np.full_like(frame.depth_m, np.nan), CAMERA)

@@ -75,10 +75,11 @@ def test_parts_are_seen_as_each_alone() -> None:
     state = FitBody(default_body(), full=False).state(facing_person(np.zeros(10)))
     faces = state.body.faces
     part = np.random.default_rng(0).integers(0, 3, len(faces))
-    together = render_parts(state.vertices, faces, part, 3, CAMERA)
-    for k in range(3):
-        alone = render_depth(state.vertices, faces[part == k], CAMERA)
-        np.testing.assert_array_equal(together[k], alone.depth_m)
+    for closed in (False, True):
+        together = render_parts(state.vertices, faces, part, 3, CAMERA, closed=closed)
+        for k in range(3):
+            alone = render_depth(state.vertices, faces[part == k], CAMERA, closed=closed)
+            np.testing.assert_array_equal(together[k], alone.depth_m)
 
 
 def test_normals_of_a_cube_point_along_its_diagonals() -> None:
