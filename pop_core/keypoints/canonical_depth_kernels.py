@@ -12,8 +12,8 @@ def read_depth(depth_m, source_v, source_u, rows, columns, nearer_m, nearest_m, 
 
     Args are measured depth (h,w) with NaN where missing, its rows and columns per pixel of a grid
     (-1 outside), the grid's rows (H) and columns (W) to read (outside it there is nothing), what
-    is subtracted [m] and the least that comes out [m]. Where a pixel is missing, the next one
-    beside it is taken.
+    is subtracted [m] and the least depth that is shown [m]. Where a pixel is missing, the next
+    one beside it is taken.
     """
     h, w = depth_m.shape
     high, wide = source_v.shape
@@ -28,5 +28,5 @@ def read_depth(depth_m, source_v, source_u, rows, columns, nearer_m, nearest_m, 
                 u = min(max(source_u[r, c] + du, 0), w - 1)
                 z = depth_m[v, u]
                 if np.isfinite(z) and z > 0:
-                    out[i, j] = max(z - nearer_m, nearest_m)
+                    out[i, j] = z - nearer_m if z - nearer_m >= nearest_m else 0.0
                     break

@@ -19,7 +19,9 @@ from pop_core.keypoints.canonical_depth_kernels import read_depth
 SHOWN_AT_M = 1.5
 MARGIN_M = 0.15  # hands, feet and the top of the head lie beyond the joints; guesses err
 SIDES_PX = (96, 224)
-NEAREST_M = 0.05
+# What stands this far before somebody brought near would be nearer than anything a network learns
+# of; left out, it is a hole like any other.
+BEFORE_M = 0.8
 # Focal length of the grid that looks are read from, relative to the network's: nobody is enlarged
 # more than a sensor resolves.
 FINEST = 3.0
@@ -98,8 +100,9 @@ def close_depth(
         for size, centre, fine_centre, scale in (
             (shown.height, shown.cy, fine.camera.cy, _ratio(fine, view)),
             (shown.width, shown.cx, fine.camera.cx, _ratio(fine, view))))
+    nearest_m = SHOWN_AT_M - BEFORE_M if view.nearer_m > 0 else 0.0
     read_depth(
-        depth_m, fine.source_v, fine.source_u, rows, columns, view.nearer_m, NEAREST_M, out)
+        depth_m, fine.source_v, fine.source_u, rows, columns, view.nearer_m, nearest_m, out)
     return out
 
 

@@ -102,7 +102,12 @@ def test_missing_depth_is_shown_as_missing():
     assert not close_depth(np.full((480, 640), np.nan, np.float32), fine, view).any()
 
 
-def test_what_stands_before_a_far_person_is_never_behind_the_camera():
+def test_what_stands_far_before_a_far_person_is_left_out():
     view, fine = view_of(VGA, 5.0)
-    shown_m = close_depth(np.full((480, 640), 1.0, np.float32), fine, view)
-    assert shown_m[shown_m > 0].min() > 0
+    for z_m, shown in ((1.0, False), (4.0, False), (4.5, True), (6.0, True)):
+        assert close_depth(np.full((480, 640), z_m, np.float32), fine, view).any() == shown
+
+
+def test_nothing_is_left_out_before_a_near_person():
+    view, fine = view_of(VGA, 1.2)
+    assert close_depth(np.full((480, 640), 0.3, np.float32), fine, view).any()
