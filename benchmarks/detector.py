@@ -40,7 +40,7 @@ def run(argv: list[str]) -> int:
     if options.scenes:
         scores = measure(detector, range(options.seed, options.seed + options.scenes))
         report |= scores.figures()
-        print(scores.text())
+        print(f'{scores.text()}\n\n{scores.joints.text()}\n')
     report |= measure_real(detector, options.real, options.out)
     if options.json is not None:
         options.json.write_text(json.dumps(report, indent=1) + '\n', encoding='utf-8')

@@ -7,6 +7,7 @@ import time
 import numpy as np
 from jaxtyping import Bool, Float
 
+from benchmarks.detector_errors import WITHIN_M, JointErrors
 from pop_core.body.joints import SHARED
 from pop_core.estimate import JointState
 from pop_core.keypoints.body_parts import CLASS_OF_LABEL, N_CLASSES
@@ -14,7 +15,6 @@ from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.synthesis.scenes import SyntheticScene
 from pop_core.synthesis.truth import PersonTruth
 
-WITHIN_M = 0.10
 SAME_BOX = 0.5   # intersection over union of boxes around what is seen
 SHOWN_M2 = 0.03  # people who show less surface neither have to be found nor are wrong to find
 
@@ -25,6 +25,7 @@ class DetectorScores:
     def __init__(self) -> None:
         """Begin with nothing."""
         self.errors: dict[str, list[float]] = {'visible': [], 'hidden': []}
+        self.joints = JointErrors()
         self.missed = {'visible': 0, 'hidden': 0}
         self.answers: list[tuple[float, bool]] = []
         self.people = 0
@@ -96,7 +97,12 @@ class DetectorScores:
     ) -> None:
         inside = person.shared_state != JointState.OUT_OF_IMAGE
         seen = person.shared_state == JointState.VISIBLE
-        error = _errors(scene, person, found) if found is not None else None
+        error = None
+        if found is not None:
+            points = _points(scene, found)
+            self.joints.add(points, person.shared_points, seen, inside)
+            error = np.nan_to_num(
+                np.linalg.norm(points - person.shared_points, axis=1), nan=np.inf)
         for kind, chosen in (('visible', inside & seen), ('hidden', inside & ~seen)):
             if error is None:
                 self.missed[kind] += int(chosen.sum())
@@ -129,17 +135,13 @@ def average_precision(answers: list[tuple[float, bool]], wanted: int) -> float:
     return float((best * right).sum() / wanted)
 
 
-def _errors(
-    scene: SyntheticScene, person: PersonTruth, found: Detection
-) -> Float[np.ndarray, '15']:
-    """Return the error of each joint [m], infinite where none was found."""
-    out = np.full(len(SHARED), np.inf)
+def _points(scene: SyntheticScene, found: Detection) -> Float[np.ndarray, '15 3']:
+    """Return where a detection has each joint, camera frame [m]; NaN where none was found."""
+    out = np.full((len(SHARED), 3), np.nan)
     depth_m = found.joint_depth_m
-    if depth_m is None:
-        return out
-    known = np.isfinite(depth_m) & np.isfinite(found.keypoints_px).all(axis=1)
-    points = scene.frame.camera.unproject(found.keypoints_px[known], depth_m[known])
-    out[known] = np.linalg.norm(points - person.shared_points[known], axis=1)
+    if depth_m is not None:
+        known = np.isfinite(depth_m) & np.isfinite(found.keypoints_px).all(axis=1)
+        out[known] = scene.frame.camera.unproject(found.keypoints_px[known], depth_m[known])
     return out
 
 
