@@ -7,6 +7,7 @@ shows the whole image and finds who is where, then each of them is looked at fro
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,11 +53,12 @@ class Views:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """One person, the cells that show them, and the view that these are of."""
+    """One person, the cells that show them, the view that these are of, and a score 0..1."""
 
     person: VotedPerson
     cells: Cells
     view: NetworkView
+    score: float
 
     @property
     def trunk(self) -> Float[np.ndarray, '3']:
@@ -109,9 +111,12 @@ class DepthNetDetector:
             return []
         member = group_cells(cells, self.config)
         groups = [cells.chosen(member == k) for k in range(member.max() + 1)]
-        looks = [Look(fuse_votes(group), group, view) for group in groups]
-        return [look for look in looks if np.isfinite(look.person.joints).all()
-                and look.person.score >= self.config.min_candidate_score][:MOST_LOOKS]
+        people = [fuse_votes(group) for group in groups]
+        looks = [Look(person, group, view, person.score)
+                 for person, group in zip(people, groups, strict=True)
+                 if np.isfinite(person.joints).all()]
+        return [look for look in looks
+                if look.score >= self.config.min_candidate_score][:MOST_LOOKS]
 
     def closer(self, frame: RgbdFrame, looks: Sequence[Look], index: int) -> Look | None:
         """Return what a near view says of one of the people; None when it shows nobody there.
@@ -128,7 +133,9 @@ class DepthNetDetector:
         own = cells.chosen(nearest_trunk(cells, trunks, self.config.reach_m) == index)
         if len(own) < FEWEST_CELLS:
             return None
-        return Look(fuse_votes(own), own, view)
+        closer = fuse_votes(own)
+        # What deceives one look seldom deceives both.
+        return Look(closer, own, view, math.sqrt(closer.score * looks[index].score))
 
     def cells(self, shown_m: Float32[np.ndarray, 'h w'], view: NetworkView) -> Cells:
         """Return what the network says of what it is shown [m]."""
@@ -165,10 +172,10 @@ def is_depth_net(session: OnnxSession) -> bool:
 def distinct(looks: Sequence[Look], config: DepthNetConfig) -> list[Look]:
     """Return those who are surely people, each once, best first: of one trunk the best look."""
     kept: list[Look] = []
-    for look in sorted(looks, key=lambda look: -look.person.score):
+    for look in sorted(looks, key=lambda look: -look.score):
         apart = all(np.linalg.norm(look.trunk - other.trunk) >= config.trunk_gap_m
                     for other in kept)
-        if apart and look.person.score >= config.min_person_score:
+        if apart and look.score >= config.min_person_score:
             kept.append(look)
     return kept
 

@@ -35,11 +35,11 @@ class DepthNetConfig:
         0.015, unit='m^2', minimum=0.0, maximum=1.0,
         about='Smallest visible surface, as seen from the camera, that makes a person.')
     min_candidate_score: float = setting(
-        0.04, minimum=0.0, maximum=1.0,
-        about='Smallest score that earns a near look; each takes 4 ms.')
+        0.09, minimum=0.0, maximum=1.0,
+        about='Smallest score that earns a near look of 4 ms: less cannot become a person.')
     min_person_score: float = setting(
-        0.25, minimum=0.0, maximum=1.0,
-        about='Smallest score of a person: that of the surface seen and of the surest joints.')
+        0.30, minimum=0.0, maximum=1.0,
+        about='Smallest score of a person: of surface and surest joints, in both looks.')
     trunk_gap_m: float = setting(
         0.30, unit='m', minimum=0.05, maximum=1.0,
         about='Two trunks nearer to each other than this are the same person.')
