@@ -93,6 +93,62 @@ def test_masks_and_parts_cover_the_people_and_nothing_else(scenes):
     assert right > 1000
 
 
+def test_boxes_hold_the_mask_and_the_joints_that_are_seen(scenes):
+    checked = 0
+    for detection in (found for scene in scenes for found in detections(scene)):
+        left, top, right, bottom = detection.box_px
+        v, u = np.nonzero(detection.person_mask)
+        assert left <= u.min() <= u.max() <= right
+        assert top <= v.min() <= v.max() <= bottom
+        sure = (detection.visible > 0.5) & (detection.scores > 0.3)
+        uv = detection.keypoints_px[sure]
+        assert (uv >= [left, top]).all()
+        assert (uv <= [right, bottom]).all()
+        checked += sure.sum()
+    assert checked > 100
+
+
+class Doubting(PerfectDetector):
+    """A detector that sees only some cells of whom it looks at from near."""
+
+    share = 0.0
+
+    def closer(self, frame, looks, index):
+        """Look with fewer cells."""
+        whole = self.cells
+        self.cells = lambda shown_m, view: thinned(whole(shown_m, view), self.share)
+        try:
+            return super().closer(frame, looks, index)
+        finally:
+            del self.cells
+
+
+def thinned(cells, share):
+    return cells.chosen(np.arange(round(share * len(cells))))
+
+
+def test_whom_the_near_look_does_not_show_is_nobody(scenes):
+    scene = next(scene for scene in scenes if detections(scene))
+    frame = RgbdFrame(np.zeros((*scene.depth_m.shape, 3), np.uint8), scene.depth_m, scene.camera)
+    detector = Doubting(scene)
+    assert detector.first_look(frame)
+    assert detector.detect(frame) == []
+
+
+def test_both_looks_say_how_surely_somebody_is_there(scenes):
+    scene = next(scene for scene in scenes if detections(scene))
+    frame = RgbdFrame(np.zeros((*scene.depth_m.shape, 3), np.uint8), scene.depth_m, scene.camera)
+    detector = Doubting(scene)
+    first = detector.first_look(frame)
+    scores = []
+    for detector.share in (0.3, 0.6, 1.0):
+        look = detector.closer(frame, first, 0)
+        low, high = sorted([look.person.score, first[0].score])
+        assert low <= look.score <= high
+        scores.append(look.score)
+    assert scores == sorted(scores)
+
+
 def test_an_empty_image_shows_nobody(scenes):
     empty = next(scene for scene in scenes if not (scene.owner >= 0).any())
     assert detections(empty) == []
