@@ -18,6 +18,7 @@ from pop_core.body.kinematics import (
     pose_skeleton,
 )
 from pop_core.body.model import AttachedPoints, BodyModel, BodyParameters, shared_points
+from pop_core.body.scalp import hair_share
 from pop_core.body.skinning import SkinningSubset
 from pop_core.rendering.depth_renderer import is_closed, vertex_normals
 
@@ -25,6 +26,7 @@ TRANSL = slice(0, 3)
 GLOBAL_ORIENT = slice(3, 6)
 BODY_POSE = slice(6, 75)
 CLOTH_M = 0.006  # mean distance of a clothed surface from the skin
+HAIR_M = 0.008  # the same of hair: between shaved and thick
 BARE = [JOINT_INDEX[name] for name in ('head', 'left_hand', 'right_hand')]
 SOLE_M = 0.02  # vertices this close to the lowest of a foot belong to its sole
 
@@ -40,6 +42,7 @@ class FitBody:
     def __init__(self, model: BodyModel, *, full: bool) -> None:
         """Prepare the coarse fitting mesh of a model, or the full output mesh."""
         self.model = model
+        chosen = np.arange(len(model.v_template)) if full else model.fit_vertices
         self.skinning = SkinningSubset(model, None if full else model.fit_vertices)
         self.faces: Int[np.ndarray, 'm 3'] = model.f if full else model.fit_faces
         self.is_closed = is_closed(self.skinning.v_template, self.faces)
@@ -47,7 +50,8 @@ class FitBody:
         self.capsules: BodyCapsules = body_capsules(model)
         self.size = 3 + 72 + model.n_betas + 1
         self.main_bone: Int[np.ndarray, 'n'] = self.skinning.bone_ids[:, 0]
-        self.cloth_m = np.where(np.isin(self.main_bone, BARE), 0.0, CLOTH_M)
+        self.cloth_m = np.where(
+            np.isin(self.main_bone, BARE), HAIR_M * hair_share(model)[chosen], CLOTH_M)
         self.soles = (self._sole('left'), self._sole('right'))
 
     def state(self, parameters: BodyParameters) -> BodyState:
@@ -89,6 +93,11 @@ class BodyState:
     def normals(self) -> Float[np.ndarray, 'n 3']:
         """Return outward unit normals of the vertices, camera frame."""
         return vertex_normals(self.vertices, self.body.faces)
+
+    @cached_property
+    def clothed(self) -> Float[np.ndarray, 'n 3']:
+        """Return where clothes and hair lie over the vertices [m]: what a sensor sees."""
+        return self.vertices + self.body.cloth_m[:, None] * self.normals
 
     @cached_property
     def joints(self) -> Float[np.ndarray, '24 3']:

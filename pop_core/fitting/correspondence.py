@@ -13,10 +13,11 @@ from pop_core.fitting.nearest_kernels import nearest
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.pair_kernels import plane_pairs
 from pop_core.fitting.residuals import Pairs, join_pairs, no_pairs
-from pop_core.fitting.robust_loss import geman_mcclure_weight
 
 SKIN_SIGMA_M = 0.010  # clothes, hair and the coarse mesh: never trust a point more than this
 EFFECTIVE_POINTS = 1000.0  # neighbouring pixels err together; so many are worth independent ones
+UNSETTLED_M = 0.02  # by how much less than the kernel's scale a body is taken to be off
+NEAREST_M = 0.1  # sensors measure nothing nearer
 VERTEX_SHARE = 0.3  # weight of vertex-to-point pairs beside point-to-vertex pairs
 
 
@@ -54,6 +55,10 @@ def match_points(
 ) -> Pairs:
     """Pair every measured point with its nearest vertex that faces the camera (pi_NN of E_NN).
 
+    Nearest is meant as sensors err, along their rays: a point that noise has put behind a rounded
+    surface belongs to where its ray meets it. By plain distance such points would all pull on the
+    sides, inward, and a body far from the camera would be fitted too thin.
+
     Args:
         state: Body.
         visibility: Which vertices face the camera.
@@ -65,12 +70,50 @@ def match_points(
     facing = np.flatnonzero(visibility.facing)
     if len(facing) == 0 or len(points) == 0:
         return no_pairs()
-    which, distance = nearest(points, state.vertices[facing])
-    vertex = facing[which]
-    worth = EFFECTIVE_POINTS * geman_mcclure_weight(distance, scale_m)
+    vertex = facing[nearest_as_sensors_err(state.clothed[facing], points, scale_m, noise)]
     # A point recognised as an arm never pulls on the chest it rests on.
     fits = (parts < 0) | NEAR_PARTS[parts, state.body.main_bone[vertex]]
-    return _plane_pairs(state, vertex, points, worth * fits, noise)
+    return _plane_pairs(state, vertex, points, EFFECTIVE_POINTS * fits, scale_m, noise)
+
+
+def nearest_as_sensors_err(
+    surface: Float[np.ndarray, 'm 3'],
+    points: Float[np.ndarray, 'n 3'],
+    scale_m: float,
+    noise: DepthNoise,
+) -> Int[np.ndarray, 'n']:
+    """Return the row of the surface's points that each measured point most probably shows.
+
+    A body that is still off is so in all directions; a sensor errs along its rays. The larger the
+    noise beside what the kernel expects of the body, the less distances along rays count.
+
+    Args:
+        surface: Points that the sensor may have seen [m].
+        points: Measured points [m].
+        scale_m: Scale of the robust kernel [m].
+        noise: Noise of the measured depth.
+    """
+    middle_m = np.median(points[:, 2], keepdims=True)
+    off_m = max(scale_m - UNSETTLED_M, SKIN_SIGMA_M)
+    shrink = float(off_m / np.hypot(off_m, noise.sigma_m(middle_m))[0])
+    return np.asarray(nearest(
+        shrunk_along_rays(points, float(middle_m[0]), shrink),
+        shrunk_along_rays(surface, float(middle_m[0]), shrink))[0])
+
+
+def shrunk_along_rays(
+    p_camera: Float[np.ndarray, 'n 3'], middle_m: float, shrink: float
+) -> Float[np.ndarray, 'n 3']:
+    """Return points [m] at coordinates in which distances along rays are shrunk.
+
+    Args:
+        p_camera: Points.
+        middle_m: Depth at which distances across rays keep their length [m].
+        shrink: Factor of distances along rays.
+    """
+    # Behind the camera nothing is measured: there a vertex only has to stay away from all points.
+    widen = middle_m / np.maximum(p_camera[:, 2], NEAREST_M)
+    return np.column_stack([p_camera[:, :2] * widen[:, None], shrink * p_camera[:, 2]])
 
 
 def match_vertices(
@@ -82,8 +125,8 @@ def match_vertices(
         return no_pairs()
     seen = state.vertices[vertex]
     target = seen * (1 + visibility.gap_m[vertex] / seen[:, 2])[:, None]
-    kernel = geman_mcclure_weight(visibility.gap_m[vertex], scale_m)
-    return _plane_pairs(state, vertex, target, kernel * VERTEX_SHARE * EFFECTIVE_POINTS, noise)
+    worth = np.full(len(vertex), VERTEX_SHARE * EFFECTIVE_POINTS)
+    return _plane_pairs(state, vertex, target, worth, scale_m, noise)
 
 
 def _plane_pairs(
@@ -91,6 +134,7 @@ def _plane_pairs(
     vertex: Int[np.ndarray, 'n'],
     target: Float[np.ndarray, 'n 3'],
     worth: Float[np.ndarray, 'n'],
+    scale_m: float,
     noise: DepthNoise,
 ) -> Pairs:
     """Return point-to-plane pairs weighted by cos(theta) / sigma^2(z, theta), robustly.
@@ -101,13 +145,15 @@ def _plane_pairs(
         state: Body.
         vertex: Vertex of each pair.
         target: Measured point of each pair [m].
-        worth: Robust weight of each pair, times the number of independent points that all pairs
-            together count for.
+        worth: Weight of each pair, times the number of independent points that all pairs together
+            count for.
+        scale_m: Scale of the robust kernel [m].
         noise: Noise of the measured depth.
     """
     sigma_m = noise.sigma_m(target[:, 2])
     return Pairs(vertex, *plane_pairs(
-        vertex, target, worth, sigma_m, SKIN_SIGMA_M, state.normals, state.body.cloth_m))
+        vertex, target, worth, sigma_m, SKIN_SIGMA_M, scale_m, state.vertices, state.normals,
+        state.body.cloth_m))
 
 
 def tangential_pairs(pairs: Pairs, share: float) -> Pairs:

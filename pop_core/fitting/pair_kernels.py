@@ -7,15 +7,22 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def plane_pairs(vertex, target, worth, sigma, skin_sigma, normals, cloth):
+def plane_pairs(
+    vertex, target, worth, sigma, skin_sigma, scale, vertices, normals, cloth,
+):
     """Return (direction, target, weight) of point-to-plane pairs, weighted by cos / sigma^2.
+
+    The sensor sees cloth; the body lies under it. The middle of the robust kernel (Geman and
+    McClure 1987) is there, too: about the skin itself, noise would draw the body in.
 
     Args:
         vertex: (n) index of each pair's vertex.
         target: (n,3) measured point [m].
-        worth: (n) robust weight.
+        worth: (n) what else multiplies the weight.
         sigma: (n) noise of the measured depth along the ray [m].
         skin_sigma: What no point is surer than [m].
+        scale: Scale of the robust kernel [m].
+        vertices: (m,3) of the body [m].
         normals: (m,3) of all vertices.
         cloth: (m) how far under the measured surface each vertex lies [m].
     """
@@ -27,10 +34,12 @@ def plane_pairs(vertex, target, worth, sigma, skin_sigma, normals, cloth):
         along = x * normals[j, 0] + y * normals[j, 1] + z * normals[j, 2]
         cosine = min(max(-along / np.sqrt(x * x + y * y + z * z), 0.1), 1.0)
         weight[i] = worth[i] / n * cosine / (skin_sigma**2 + (cosine * sigma[i]) ** 2)
+        off = 0.0
         for c in range(3):
             direction[i, c] = normals[j, c]
-            # The sensor sees cloth; the body lies under it.
             skin[i, c] = target[i, c] - cloth[j] * normals[j, c]
+            off += (skin[i, c] - vertices[j, c]) ** 2
+        weight[i] *= (scale**2 / (scale**2 + off)) ** 2
     return direction, skin, weight
 
 

@@ -79,8 +79,11 @@ def conditional_prior_term(
 
 
 def scale_weight(state: BodyState, kernel: Kernel) -> float:
-    """Return the robust weight of the scale prior: adults vary little, children much."""
-    deviation = abs(np.log(state.parameters.scale)) / SCALE_SIGMA
+    """Return the robust weight of the scale prior: adults vary little, children much.
+
+    It is robust to the small side only: there are children, but no giants.
+    """
+    deviation = max(-np.log(state.parameters.scale), 0.0) / SCALE_SIGMA
     return float(kernel(np.array([deviation]), SCALE_TAIL)[0])
 
 

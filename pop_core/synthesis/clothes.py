@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 
 from pop_core.body.joints import JOINT_INDEX, JOINT_NAMES
 from pop_core.body.model import BodyModel
+from pop_core.body.scalp import hair_share
 from pop_core.rendering.depth_renderer import vertex_normals
 from pop_core.synthesis.rooms import any_colour, varied
 
@@ -68,17 +69,6 @@ def smooth_noise(
     lengths = rng.uniform(SHORTEST_FOLD_M, LONGEST_FOLD_M, waves)
     phases = p @ (directions * (2 * np.pi / lengths)[:, None]).T + rng.uniform(0, 2 * np.pi, waves)
     return np.sin(phases).mean(axis=1) * 2.0
-
-
-def hair_share(model: BodyModel) -> Float[np.ndarray, 'v']:
-    """Return 1 where hair grows, fading to 0: top and back of the head."""
-    on_head = model.weights[:, JOINT_INDEX['head']] > 0.6
-    head = model.v_template[on_head]
-    low, high = head.min(axis=0), head.max(axis=0)
-    height = (model.v_template[:, 1] - low[1]) / (high[1] - low[1])
-    front = (model.v_template[:, 2] - low[2]) / (high[2] - low[2])
-    share = np.clip((height - 0.35 - 0.42 * np.clip(front - 0.3, 0.0, 0.65) / 0.65) * 8, 0.0, 1.0)
-    return np.where(on_head, share, 0.0)
 
 
 _TORSO = ('pelvis', 'spine1', 'spine2', 'spine3', 'left_collar', 'right_collar')
