@@ -26,7 +26,13 @@ from benchmarks.accuracy_methods import (
 )
 from benchmarks.accuracy_paper import paper_subset, paper_table
 from benchmarks.accuracy_records import match, person_record
-from benchmarks.accuracy_summary import coverage_lines, group_lines, summarise, table
+from benchmarks.accuracy_summary import (
+    coverage_lines,
+    group_lines,
+    shape_lines,
+    summarise,
+    table,
+)
 from pop_core.body.default_body import default_body
 from pop_core.body.model import BodyModel
 from pop_core.config import PipelineConfig
@@ -66,7 +72,7 @@ def run(argv: list[str]) -> int:
     report = summary_of(entries, list(methods))
     print_report(report, console)
     console.print(paper_table(paper_subset(entries, MAIN)))
-    for line in group_lines(people_of(entries, MAIN)):
+    for line in [*group_lines(people_of(entries, MAIN)), *shape_lines(people_of(entries, MAIN))]:
         console.print(line)
     if options.json is not None:
         people = {name: people_of(entries, name) for name in methods}

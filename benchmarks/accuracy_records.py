@@ -101,6 +101,7 @@ def _shape_figures(model: BodyModel, person: PersonTruth, estimate: BodyParamete
         'err_beta': metrics.shape_error(model, estimate, truth),
         'tpose': metrics.tpose_error(model, estimate, truth),
         'stature': abs(height),
+        'too_tall': height,
         'pve': metrics.vertex_error(vertices(model, estimate), person.vertices),
     }
 

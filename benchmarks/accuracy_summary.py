@@ -56,6 +56,7 @@ ROWS = (
     Row('tpose', 'T-pose vertices', 'mm'),
     Row('tpose_bare', '  of the unclothed', 'mm'),
     Row('stature', 'stature', 'mm'),
+    Row('too_tall', '  too tall (+), too short (-)', 'mm'),
     Row('stature_bare', '  of the unclothed', 'mm'),
     Row('free_space', 'free-space violation', '%'),
     Row('free_space_truth', '  the truth body itself', '%'),
@@ -149,6 +150,23 @@ def group_lines(records: Sequence[Record]) -> list[str]:
             median = 1000 * float(np.median(errors)) if errors else float('nan')
             cells.append(f'{value} {median:.0f} mm, {failed} of {len(group)} failed')
         lines.append(f'by {name} (median err_pose): ' + '; '.join(cells))
+    return lines
+
+
+def shape_lines(records: Sequence[Record]) -> list[str]:
+    """Return sentences on whose shape is wrong, and to which side: clothes, sizes, poses."""
+    lines = []
+    for name in ('bare', 'child', 'kind', 'sensor'):
+        cells = []
+        for value in sorted({record[name] for record in records}, key=str):
+            group = [r for r in records if r[name] == value and r['found']]
+            if group:
+                tpose, stature, too_tall = (
+                    1000 * float(np.mean([record[key] for record in group]))
+                    for key in ('tpose', 'stature', 'too_tall'))
+                cells.append(
+                    f'{value} {tpose:.0f} mm, {stature:.0f} mm ({too_tall:+.0f}), {len(group)}')
+        lines.append(f'by {name} (T-pose, stature (too tall), people): ' + '; '.join(cells))
     return lines
 
 

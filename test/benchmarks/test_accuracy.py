@@ -15,6 +15,7 @@ from benchmarks.accuracy_summary import (
     FAILURE_M,
     coverage_lines,
     group_lines,
+    shape_lines,
     summarise,
     table,
 )
@@ -168,6 +169,18 @@ def test_groups_tell_which_poses_fail():
         common | {'kind': 'lying', 'err_pose': 0.3}, common | {'kind': 'lying', 'err_pose': 0.1},
         common | {'kind': 'standing', 'err_pose': 0.02}]
     assert 'lying 200 mm, 1 of 2 failed; standing 20 mm, 0 of 1 failed' in group_lines(records)[0]
+
+
+def test_shape_errors_are_told_by_who_they_are_of():
+    common = {'found': True, 'child': False, 'kind': 'standing', 'sensor': '', 'tpose': 0.01}
+    records = [
+        common | {'bare': False, 'stature': 0.03, 'too_tall': 0.03},
+        common | {'bare': False, 'stature': 0.01, 'too_tall': -0.01},
+        common | {'bare': True, 'stature': 0.02, 'too_tall': -0.02},
+        {'found': False, 'bare': True, 'child': True, 'kind': 'lying', 'sensor': ''}]
+    of_bare, of_child, *_ = shape_lines(records)
+    assert of_bare.endswith('False 10 mm, 20 mm (+10), 2; True 10 mm, 20 mm (-20), 1')
+    assert 'True' not in of_child  # nobody found has no shape
 
 
 def test_the_table_shows_every_method():
