@@ -26,7 +26,7 @@ TRANSL = slice(0, 3)
 GLOBAL_ORIENT = slice(3, 6)
 BODY_POSE = slice(6, 75)
 CLOTH_M = 0.006  # mean distance of a clothed surface from the skin
-HAIR_M = 0.008  # the same of hair: between shaved and thick
+HAIR_M = 0.004  # the same of hair: between shaved and thick, mostly short
 BARE = [JOINT_INDEX[name] for name in ('head', 'left_hand', 'right_hand')]
 SOLE_M = 0.02  # vertices this close to the lowest of a foot belong to its sole
 
