@@ -41,7 +41,7 @@ from pop_core.segmentation.body_segmentation import SegmentationConfig, segment_
 WIDEST_M = 0.15  # first scale of the robust surface kernel
 TANGENTIAL_SHARE = 0.3  # of point to point beside point to plane, at the widest kernel
 # The surface knows better than keypoints once the kernel is narrower than this.
-TRUSTED_M = 0.05
+TRUSTED_M = 0.10
 # Weight of E_depth [per metre of mean pixel error] beside the other terms' costs.
 DEPTH_SCORE = 1000.0
 
