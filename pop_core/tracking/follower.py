@@ -34,7 +34,7 @@ from pop_core.tracking.limb_rest import LimbRests
 from pop_core.tracking.limbs import contradicted_joints
 from pop_core.tracking.liveliness import followed_trail, liveliness
 from pop_core.tracking.motion import N_MOVING
-from pop_core.tracking.rivals import costs, follow_alternatives, lead
+from pop_core.tracking.rivals import costs, follow_alternatives, lead, with_limbs_of
 from pop_core.tracking.sides import misnamed_joints, without_joints
 from pop_core.tracking.track import Alternative, PersonTrack
 from pop_core.tracking.track_view import observe_track
@@ -170,17 +170,22 @@ class Follower:
         belief = self._found_anew(track, rival, observation.lifted)
         other = self.warm.fit(belief, observation, self.config.steps, detected=True)
         ours, theirs = costs(self.warm.fitter, [fit, other], observation)
-        if theirs >= ours - lead(track, rival.stamp_ns):
+        margin = lead(track, rival.stamp_ns)
+        if theirs >= ours - margin:
             track.tries += track.tries > 0
             track.rivals_beaten += was_doubted
-            return fit
+            return with_limbs_of(
+                self.warm, track, fit, other, observation, steps=self.config.steps,
+                margin=margin)
         track.restarted_ns, track.doubts = track.now_ns, 0
         track.tries += 1
         track.rivals_beaten = 0
         track.filter, track.depth_level = belief, None
         self._forget_limbs(track)
         track.alternatives.clear()
-        return other
+        return with_limbs_of(
+            self.warm, track, other, fit, observation, steps=self.config.steps,
+            margin=margin)
 
     def _found_anew(
         self, track: PersonTrack, fresh: FreshFit, lifted: LiftedJoints | None

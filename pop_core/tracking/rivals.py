@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool
@@ -11,8 +12,10 @@ from pop_core.fitting.body_fit import BodyFitter
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.energy import PriorBelief
 from pop_core.fitting.hypotheses import Hypothesis
+from pop_core.fitting.limb_exchange import MARGIN, exchange_limbs
 from pop_core.fitting.observation import Observation
 from pop_core.tracking.detection_schedule import LONG_GAP_S
+from pop_core.tracking.limbs import loosened
 from pop_core.tracking.track import PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
 from pop_core.tracking.warm_start import FollowedBody, WarmFit, WarmStart, updated
@@ -28,8 +31,13 @@ def costs(
     fitter: BodyFitter, fits: Sequence[FollowedBody], observation: Observation
 ) -> list[float]:
     """Return the cost of each fit by E_depth, keypoints and priors, on common pixels."""
-    common: Bool[np.ndarray, 'h w'] = np.mean([fit.segment for fit in fits], axis=0) >= 0.5
-    return costs_over(fitter, [fit.state for fit in fits], observation, common)
+    return costs_over(
+        fitter, [fit.state for fit in fits], observation, common_segment(fits))
+
+
+def common_segment(fits: Sequence[FollowedBody]) -> Bool[np.ndarray, 'h w']:
+    """Return the pixels that at least half of the fits call the person's."""
+    return np.asarray(np.mean([fit.segment for fit in fits], axis=0) >= 0.5)
 
 
 def costs_over(
@@ -42,11 +50,51 @@ def costs_over(
     what is not seen over many frames, here it would speak against rare poses that are. Decisions
     are as good with either (`python -m benchmarks tracking`).
     """
-    hypotheses = [
-        Hypothesis(body, PriorBelief(fitter.prior, body.parameters.body_pose, np.ones(23)))
-        for body in bodies]
+    hypotheses = [_hypothesis(fitter, body) for body in bodies]
     fitter.steps.score(hypotheses, observation, segment)
     return [hypothesis.cost for hypothesis in hypotheses]
+
+
+def with_limbs_of(
+    warm: WarmStart, track: PersonTrack, best: WarmFit, other: WarmFit, observation: Observation,
+    *, steps: int, margin: float,
+) -> WarmFit:
+    """Return the better of two explanations, with those limbs that the other one has right.
+
+    Its belief becomes the track's. What was followed knows a leg that moves little, what was found
+    anew an arm that moved far.
+
+    Args:
+        warm: Fits and judges.
+        track: The person, with the belief that `best` was fitted from.
+        best: The better explanation.
+        other: Another one of the same frame.
+        observation: What the sensor says.
+        steps: Of the fit of both together.
+        margin: Cost that each limb must save.
+    """
+    fitter, common = warm.fitter, common_segment([best, other])
+    hypotheses = [_hypothesis(fitter, each.state) for each in (best, other)]
+
+    def judge(trials: Sequence[Hypothesis]) -> None:
+        fitter.steps.score(trials, observation, common)
+
+    judge(hypotheses)
+    mixed = exchange_limbs(hypotheses[0], hypotheses[1:], judge, margin + MARGIN).state.parameters
+    turned = (mixed.body_pose != best.state.parameters.body_pose).any(axis=1)
+    if not turned.any():
+        return best
+    belief = replace(loosened(track.filter, np.append(False, turned)), parameters=mixed)
+    fit = warm.fit(belief, observation, steps, detected=True)
+    ours, theirs = costs(fitter, [best, fit], observation)
+    if theirs >= ours:
+        return best
+    track.filter = belief
+    return fit
+
+
+def _hypothesis(fitter: BodyFitter, body: BodyState) -> Hypothesis:
+    return Hypothesis(body, PriorBelief(fitter.prior, body.parameters.body_pose, np.ones(23)))
 
 
 def lead(track: PersonTrack, stamp_ns: int) -> float:
