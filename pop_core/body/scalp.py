@@ -15,8 +15,9 @@ def hair_share(model: BodyModel) -> Float[np.ndarray, 'v']:
     if not on_head.any():
         return np.zeros(len(on_head))
     head = model.v_template[on_head]
-    low, high = head.min(axis=0), head.max(axis=0)
-    height = (model.v_template[:, 1] - low[1]) / (high[1] - low[1])
-    front = (model.v_template[:, 2] - low[2]) / (high[2] - low[2])
+    low = head.min(axis=0)
+    extent = np.maximum(head.max(axis=0) - low, 1e-6)
+    height = (model.v_template[:, 1] - low[1]) / extent[1]
+    front = (model.v_template[:, 2] - low[2]) / extent[2]
     share = np.clip((height - 0.35 - 0.42 * np.clip(front - 0.3, 0.0, 0.65) / 0.65) * 8, 0.0, 1.0)
     return np.where(on_head, share, 0.0)

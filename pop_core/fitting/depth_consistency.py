@@ -95,6 +95,8 @@ class HidingPlaces:
     ) -> tuple[Float[np.ndarray, 'n 3'], Bool[np.ndarray, 'n']]:
         """Return the nearest hidden place at each point's depth [m], and whether there is one."""
         _, uv = self.observation.depth_at(points)
+        h, w = self.observation.depth_m.shape
+        uv = np.clip(uv, 0, [w - 1, h - 1])  # by rounding, half a pixel may be another
         # The slice before a point's depth is the cautious one: what hides there, hides it.
         which = np.searchsorted(self.slices_m, points[:, 2], side='right') - 1
         which = np.clip(which, 0, DEPTH_SLICES - 1)
@@ -104,7 +106,7 @@ class HidingPlaces:
             # Every other pixel: a pull sideways need not know its end to the pixel.
             pixel[rows] = nearest_pixels(self._slice(int(k)), uv[rows] // 2)
         known = pixel[:, 0] >= 0
-        pixel *= 2
+        pixel = 2 * np.maximum(pixel, 0)
         ray = self.observation.rays[pixel[:, 1], pixel[:, 0]]
         return np.column_stack([ray * points[:, 2:], points[:, 2]]), known
 

@@ -91,7 +91,7 @@ class StepReport(Generic[StateT]):
 
 def cost_of(blocks: Sequence[Term]) -> float:
     """Return what all terms cost."""
-    return sum(block.cost for block in blocks)
+    return sum((block.cost for block in blocks), 0.0)
 
 
 def assemble(blocks: Sequence[Term], size: int) -> NormalEquations:

@@ -35,15 +35,18 @@ class CanonicalView:
     rays: Float32[np.ndarray, 'h w 2']
 
 
-def canonical_view(camera: Camera, focal_px: float) -> CanonicalView:
+def canonical_view(
+    camera: Camera, focal_px: float, largest_px: float = LARGEST_SIDE
+) -> CanonicalView:
     """Return the view that covers a camera's image.
 
     Args:
         camera: The measuring camera; lens distortion is undone.
         focal_px: Focal length of the view [px].
+        largest_px: Wider views than this are cut at the sides [px].
     """
     rays = camera.ray_grid()
-    low, high = (_extreme(rays, focal_px, side) for side in (0, 1))
+    low, high = (_extreme(rays, focal_px, side, largest_px / 2) for side in (0, 1))
     width, height = (_side(b - a) for a, b in zip(low, high, strict=True))
     # What padding there is lies evenly on both sides.
     cx, cy = ((size - 1) / 2 - (a + b) / 2 for size, a, b in zip(
@@ -74,10 +77,9 @@ def canonical_depth(
 
 
 def _extreme(
-    rays: Float[np.ndarray, 'h w 2'], focal_px: float, side: int
+    rays: Float[np.ndarray, 'h w 2'], focal_px: float, side: int, bound: float
 ) -> Float[np.ndarray, '2']:
     """Return the least (0) or greatest (1) canonical u and v, within what a network can take."""
-    bound = LARGEST_SIDE / 2
     uv = np.nan_to_num(rays.reshape(-1, 2) * focal_px)
     extreme = uv.max(axis=0) if side else uv.min(axis=0)
     return np.clip(extreme, -bound, bound)

@@ -19,7 +19,12 @@ from jaxtyping import Float, Float32
 from pop_core.errors import NetworkShapeError
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.body_parts import N_CLASSES
-from pop_core.keypoints.canonical_depth import CanonicalView, canonical_depth, canonical_view
+from pop_core.keypoints.canonical_depth import (
+    LARGEST_SIDE,
+    CanonicalView,
+    canonical_depth,
+    canonical_view,
+)
 from pop_core.keypoints.close_view import FINEST, NetworkView, close_depth, close_view
 from pop_core.keypoints.depth_grouping import group_cells, nearest_trunk
 from pop_core.keypoints.depth_masks import PixelLabels, label_pixels, no_labels
@@ -37,6 +42,7 @@ OUTPUTS = (('parts', N_CLASSES), ('votes', 45), ('log_sigma', 15), ('visible', 1
 EXPECTED = ('a depth network of this package: depth_m (1, 1, ?, ?) float32 -> '
             + ', '.join(f'{name} (1, {channels}, ?, ?)' for name, channels in OUTPUTS))
 FEWEST_CELLS = 4
+FARTHEST_M = 30.0  # no depth camera sees people there: the image is not in metres
 MOST_LOOKS = 32  # an image of nothing but noise must not take seconds
 BOX_SCORE = 0.3  # of joints whose pixels a person's box holds: thin limbs may lack in the mask
 FOCAL_PX = (40.0, 1000.0)  # no network of this kind looks finer or coarser
@@ -114,7 +120,7 @@ class DepthNetDetector:
         people = [fuse_votes(group) for group in groups]
         looks = [Look(person, group, view, person.score)
                  for person, group in zip(people, groups, strict=True)
-                 if np.isfinite(person.joints).all()]
+                 if np.isfinite(person.joints).all() and person.surface_m < FARTHEST_M]
         return [look for look in looks
                 if look.score >= self.config.min_candidate_score][:MOST_LOOKS]
 
@@ -134,6 +140,8 @@ class DepthNetDetector:
         if len(own) < FEWEST_CELLS:
             return None
         closer = fuse_votes(own)
+        if not np.isfinite(closer.joints).all():
+            return None
         # What deceives one look seldom deceives both.
         return Look(closer, own, view, math.sqrt(closer.score * looks[index].score))
 
@@ -149,7 +157,8 @@ class DepthNetDetector:
         """Return the views of a camera; kept while the camera stays the same."""
         if self._views is None or not self._views.camera.sees_like(camera):
             self._views = Views(camera, canonical_view(camera, self.focal_px),
-                                canonical_view(camera, FINEST * self.focal_px))
+                                canonical_view(
+                                    camera, FINEST * self.focal_px, FINEST * LARGEST_SIDE))
         return self._views
 
 

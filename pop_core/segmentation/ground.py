@@ -51,9 +51,9 @@ class Ground:
         across = self.normal[0] * (np.arange(camera.width) - camera.cx) / camera.fx
         down = self.normal[1] * (np.arange(camera.height) - camera.cy) / camera.fy
         along_ray = (down + self.normal[2]).astype(np.float32)[:, None] + across.astype(np.float32)
-        # height - width of the floor, in the order that needs the fewest passes
-        above = (along_ray - np.float32(0.002) * depth_m) * depth_m
-        with np.errstate(invalid='ignore'):
+        with np.errstate(invalid='ignore', over='ignore'):
+            # height - width of the floor, in the order that needs the fewest passes
+            above = (along_ray - np.float32(0.002) * depth_m) * depth_m
             return np.asarray(above < np.float32(FLOOR_M - self.offset_m))
 
 

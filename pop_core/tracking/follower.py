@@ -174,9 +174,12 @@ class Follower:
         if theirs >= ours - margin:
             track.tries += track.tries > 0
             track.rivals_beaten += was_doubted
-            return with_limbs_of(
+            mixed = with_limbs_of(
                 self.warm, track, fit, other, observation, steps=self.config.steps,
                 margin=margin)
+            if mixed is not fit:
+                self.late_limbs.forget(track.id)
+            return mixed
         track.restarted_ns, track.doubts = track.now_ns, 0
         track.tries += 1
         track.rivals_beaten = 0

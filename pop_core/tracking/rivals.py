@@ -71,7 +71,7 @@ def with_limbs_of(
         other: Another one of the same frame.
         observation: What the sensor says.
         steps: Of the fit of both together.
-        margin: Cost that each limb must save.
+        margin: Cost that each limb must save beyond what is noise.
     """
     fitter, common = warm.fitter, common_segment([best, other])
     hypotheses = [_hypothesis(fitter, each.state) for each in (best, other)]
@@ -79,7 +79,7 @@ def with_limbs_of(
     def judge(trials: Sequence[Hypothesis]) -> None:
         fitter.steps.score(trials, observation, common)
 
-    judge(hypotheses)
+    judge(hypotheses[:1])
     mixed = exchange_limbs(hypotheses[0], hypotheses[1:], judge, margin + MARGIN).state.parameters
     turned = (mixed.body_pose != best.state.parameters.body_pose).any(axis=1)
     if not turned.any():

@@ -130,4 +130,3 @@ def _joint_weight(
     scale_m = np.hypot(weights.robust_m, SURE_SIGMAS * prediction.landmark_sigma_m)
     robust = geman_mcclure_weight(np.linalg.norm(offset, axis=1) / scale_m, 1.0)
     return np.where(lifted.lifted, weights.joints * robust / lifted.sigma_m**2, 0.0)
-

@@ -4,6 +4,7 @@ from pop_core.fitting.levenberg_marquardt import (
     FIRST_DAMPING,
     Residual,
     assemble,
+    cost_of,
     levenberg_marquardt_step,
 )
 
@@ -46,6 +47,10 @@ def test_nothing_moves_where_the_cost_has_no_derivative() -> None:
     report = levenberg_marquardt_step(start, rosenbrock, np.add, EVERYTHING, FIRST_DAMPING)
     assert report.state is start
     assert not report.accepted
+
+
+def test_no_terms_cost_nothing_as_a_float() -> None:
+    assert isinstance(cost_of([]), float)  # messages take no integers
 
 
 def test_weighted_normal_equations_are_those_of_the_textbook() -> None:

@@ -129,6 +129,27 @@ def test_small_people_may_be_children_but_there_are_no_giants(state: BodyState) 
     assert weight(0.7) < 0.1 < weight(0.95)
 
 
+def test_hessians_of_priors_bend_the_cost_where_the_residuals_vanish(
+    state: BodyState, person: BodyParameters
+) -> None:
+    """At a residual of zero the Gauss-Newton Hessian is the whole one."""
+    sigma = np.linspace(0.2, 0.9, 23)
+    there = state.parameters.body_pose
+    rest = state.body.state(person.replaced(betas=np.zeros(len(person.betas)), scale=1.0))
+    for term, at in (
+        (lambda s: conditional_prior_term(s, there, sigma, 0.7, jacobian=True), state),
+        (lambda s: shape_prior_term(s, 0.3), rest),
+    ):
+        model = term(at)
+        assert model.cost == pytest.approx(0.0, abs=1e-12)
+        own = slice(model.first, model.first + len(model.gradient))
+        for seed in range(3):
+            step = np.zeros(at.body.size)
+            step[own] = 1e-3 * np.random.default_rng(seed).normal(size=own.stop - own.start)
+            bent = 0.5 * step[own] @ model.hessian @ step[own]
+            assert term(at.moved(step)).cost == pytest.approx(bent, rel=1e-2)
+
+
 def test_joint_term_vanishes_at_the_lifted_joints(
     body: BodyModel, person: BodyParameters
 ) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pop_core.geometry.camera import Camera
-from pop_core.keypoints.canonical_depth import canonical_view
+from pop_core.keypoints.canonical_depth import LARGEST_SIDE, canonical_view
 from pop_core.keypoints.close_view import (
     FINEST,
     SHOWN_AT_M,
@@ -29,7 +29,7 @@ def somebody(z_m, x_m=0.0, height_m=1.4):
 
 def view_of(camera, z_m, x_m=0.0, height_m=1.4):
     joints, surface_m = somebody(z_m, x_m, height_m)
-    fine = canonical_view(camera, FINEST * FOCAL_PX)
+    fine = canonical_view(camera, FINEST * FOCAL_PX, FINEST * LARGEST_SIDE)
     return close_view(FOCAL_PX, joints, surface_m, fine), fine
 
 
@@ -66,6 +66,13 @@ def test_views_hold_the_joints_and_fit_the_network(z_m, x_m):
     for side in (view.camera.width, view.camera.height):
         assert side % 32 == 0
         assert SIDES_PX[0] <= side <= SIDES_PX[1]
+
+
+def test_somebody_at_the_side_of_a_wide_camera_is_shown():
+    wide = Camera(640, 576, 252.0, 252.0, 319.5, 287.5)
+    view, fine = view_of(wide, 2.0, x_m=2.1)
+    shown = close_depth(np.full((576, 640), 2.0, np.float32), fine, view)
+    assert (shown > 0).all()
 
 
 def test_what_lies_beyond_the_border_is_not_shown():

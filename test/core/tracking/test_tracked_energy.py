@@ -6,7 +6,7 @@ from support.derivatives import assert_is_gradient
 
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.fitting.body_state import BodyState, FitBody
-from pop_core.tracking.body_filter import first_state, predict
+from pop_core.tracking.body_filter import difference, first_state, predict
 from pop_core.tracking.tracked_energy import Prediction
 
 
@@ -45,6 +45,25 @@ def test_the_hessian_is_the_information_where_the_body_was_predicted(
     predicted, here = prediction
     np.testing.assert_allclose(
         predicted.term(here, jacobian=True).hessian, predicted.information, rtol=1e-6, atol=1e-6)
+
+
+def test_the_hessian_elsewhere_is_that_of_the_turned_increments(
+    prediction: tuple[Prediction, BodyState]
+) -> None:
+    predicted, here = prediction
+    away = here.moved(0.2 * np.random.default_rng(2).normal(size=here.body.size))
+    J = np.empty((here.body.size, here.body.size))
+    for k in range(here.body.size):
+        step = np.zeros(here.body.size)
+        step[k] = 1e-6
+        ahead, behind = (
+            difference(away.moved(sign * step).parameters, predicted.parameters)
+            for sign in (1, -1))
+        J[:, k] = (ahead - behind) / 2e-6
+    expected = J.T @ predicted.information @ J
+    np.testing.assert_allclose(
+        predicted.term(away, jacobian=True).hessian, expected,
+        atol=1e-5 * np.abs(expected).max())
 
 
 def test_a_joint_at_the_end_of_a_limb_is_the_least_certain(
