@@ -91,5 +91,7 @@ def test_another_camera_begins_anew_though_time_goes_on(
     number = shown(player, frames[1:2])
     camera = frames[0].camera
     other = replace(camera, fx=1.03 * camera.fx, fy=1.03 * camera.fy)
-    number = ended(player, number, replace(frames[2], camera=other))
+    strange = replace(frames[2], camera=other)
+    player.announce(strange)
+    number = ended(player, number, strange)
     assert shown(player, [replace(frames[3], camera=other)]) == number

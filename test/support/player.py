@@ -78,6 +78,11 @@ class Player(Listener):
         publishers = (self._color, self._depth, self._info)
         return all(p.get_subscription_count() for p in publishers)
 
+    def announce(self, frame: RgbdFrame) -> None:
+        """Publish the camera of a frame, well before its images: topics overtake each other."""
+        self._info.publish(info_message(frame.camera, make_header(frame.stamp_ns, FRAME_ID)))
+        self.spin_until(lambda: False, timeout_s=0.5)
+
     def play(self, frame: RgbdFrame) -> None:
         header = make_header(frame.stamp_ns, FRAME_ID)
         self._info.publish(info_message(frame.camera, header))
