@@ -20,7 +20,7 @@ LIMBS = tuple(np.isin(np.arange(23), kind.rows) for kind in KINDS)  # rotations 
 
 
 def exchange_limbs(
-    best: Hypothesis, others: Sequence[Hypothesis], judge: Judge, margin: float = MARGIN
+    best: Hypothesis, others: Sequence[Hypothesis], judge: Judge
 ) -> Hypothesis:
     """Return a hypothesis with the limbs of others where they explain what is seen better.
 
@@ -28,7 +28,6 @@ def exchange_limbs(
         best: The hypothesis to improve; its cost is known.
         others: Where limbs are taken from.
         judge: Sets the cost of hypotheses.
-        margin: Cost that each exchange must save.
     """
     for limb in LIMBS:
         turns, pose = limb[:, None], best.state.parameters.body_pose
@@ -37,5 +36,5 @@ def exchange_limbs(
                 best, np.where(turns, other.state.parameters.body_pose, pose),
                 np.where(turns, other.belief.pose, best.belief.pose))
             for other in others]
-        best = cheapest(best, trials, judge, margin)
+        best = cheapest(best, trials, judge, MARGIN)
     return best

@@ -174,21 +174,26 @@ class Follower:
         if theirs >= ours - margin:
             track.tries += track.tries > 0
             track.rivals_beaten += was_doubted
-            mixed = with_limbs_of(
-                self.warm, track, fit, other, observation, steps=self.config.steps,
-                margin=margin)
-            if mixed is not fit:
-                self.late_limbs.forget(track.id)
-            return mixed
+            return self._with_limbs_of(track, fit, other, observation, margin)
         track.restarted_ns, track.doubts = track.now_ns, 0
         track.tries += 1
         track.rivals_beaten = 0
         track.filter, track.depth_level = belief, None
         self._forget_limbs(track)
         track.alternatives.clear()
-        return with_limbs_of(
-            self.warm, track, other, fit, observation, steps=self.config.steps,
-            margin=margin)
+        return self._with_limbs_of(track, other, fit, observation, margin)
+
+    def _with_limbs_of(
+        self, track: PersonTrack, best: WarmFit, other: WarmFit, observation: Observation,
+        lead_needed: float,
+    ) -> WarmFit:
+        """Return a body with what limbs another one has right, between frames far apart."""
+        if lead_needed > 0.0:  # of a fast camera: whoever is better is so in every limb
+            return best
+        mixed = with_limbs_of(self.warm, track, best, other, observation, self.config.steps)
+        if mixed is not best:
+            self.late_limbs.forget(track.id)
+        return mixed
 
     def _found_anew(
         self, track: PersonTrack, fresh: FreshFit, lifted: LiftedJoints | None

@@ -12,7 +12,7 @@ from pop_core.fitting.body_fit import BodyFitter
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.energy import PriorBelief
 from pop_core.fitting.hypotheses import Hypothesis
-from pop_core.fitting.limb_exchange import MARGIN, exchange_limbs
+from pop_core.fitting.limb_exchange import exchange_limbs
 from pop_core.fitting.observation import Observation
 from pop_core.tracking.detection_schedule import LONG_GAP_S
 from pop_core.tracking.limbs import loosened
@@ -57,7 +57,7 @@ def costs_over(
 
 def with_limbs_of(
     warm: WarmStart, track: PersonTrack, best: WarmFit, other: WarmFit, observation: Observation,
-    *, steps: int, margin: float,
+    steps: int,
 ) -> WarmFit:
     """Return the better of two explanations, with those limbs that the other one has right.
 
@@ -71,7 +71,6 @@ def with_limbs_of(
         other: Another one of the same frame.
         observation: What the sensor says.
         steps: Of the fit of both together.
-        margin: Cost that each limb must save beyond what is noise.
     """
     fitter, common = warm.fitter, common_segment([best, other])
     hypotheses = [_hypothesis(fitter, each.state) for each in (best, other)]
@@ -80,7 +79,7 @@ def with_limbs_of(
         fitter.steps.score(trials, observation, common)
 
     judge(hypotheses[:1])
-    mixed = exchange_limbs(hypotheses[0], hypotheses[1:], judge, margin + MARGIN).state.parameters
+    mixed = exchange_limbs(hypotheses[0], hypotheses[1:], judge).state.parameters
     turned = (mixed.body_pose != best.state.parameters.body_pose).any(axis=1)
     if not turned.any():
         return best

@@ -53,7 +53,7 @@ def test_each_limb_is_taken_from_whom_it_explains_what_is_seen(
     track = followed(with_leg_wrong.belief)
     mixed = with_limbs_of(
         warm, track, with_leg_wrong.body, with_arm_wrong.body, with_leg_wrong.observation,
-        steps=STEPS, margin=0.0)
+        STEPS)
     assert mixed is not with_leg_wrong.body
     assert np.linalg.norm(mixed.state.joints - joints(body, true), axis=1).max() < 0.06
     # The belief is the one that the fit began with: the leg of the other, and little known of it.
@@ -71,6 +71,6 @@ def test_a_body_that_has_every_limb_right_is_left_alone(
     wrong = lost_limbs(pipeline, body, person, raised(person, -0.9))
     track = followed(right.belief)
     assert with_limbs_of(
-        warm, track, right.body, wrong.body, right.observation, steps=STEPS, margin=0.0
+        warm, track, right.body, wrong.body, right.observation, STEPS
     ) is right.body
     assert track.filter is right.belief
