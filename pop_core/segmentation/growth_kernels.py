@@ -9,6 +9,27 @@ from pop_core.geometry.nearest_pixel_kernels import nearest_pixel, nearest_rows
 
 
 @njit(cache=True, nogil=True)
+def _listed(mask):
+    """Return the pixels (y, x) of a mask, with room for all others behind them, and how many."""
+    h, w = mask.shape
+    queue = np.empty((h * w, 2), dtype=np.int32)
+    count = 0
+    for y in range(h):
+        for x in range(w):
+            if mask[y, x]:
+                queue[count, 0], queue[count, 1] = y, x
+                count += 1
+    return queue, count
+
+
+@njit(cache=True, nogil=True)
+def _beside(y, x, k):
+    """Return the pixel below, above, to the right or to the left of one, for k of 0 to 3."""
+    return (y + (1 if k == 0 else -1 if k == 1 else 0),
+            x + (1 if k == 2 else -1 if k == 3 else 0))
+
+
+@njit(cache=True, nogil=True)
 def segment(depth, rendered, own, gamma, tolerance, growth, nearest, out):
     """Fill `out` with the measured pixels of a body: those it covers, and the rim joined to them.
 
@@ -25,22 +46,18 @@ def segment(depth, rendered, own, gamma, tolerance, growth, nearest, out):
     h, w = depth.shape
     row = nearest_rows(rendered < np.inf)
     farthest = growth / max(rendered.min(), nearest)
-    queue = np.empty((h * w, 2), dtype=np.int32)
-    tail = 0
     for y in range(h):
         for x in range(w):
-            if (rendered[y, x] != np.inf and own[y, x]
-                    and abs(depth[y, x] - rendered[y, x]) < tolerance):
-                out[y, x] = True
-                queue[tail, 0], queue[tail, 1] = y, x
-                tail += 1
+            out[y, x] = (
+                rendered[y, x] != np.inf and own[y, x]
+                and abs(depth[y, x] - rendered[y, x]) < tolerance)
+    queue, tail = _listed(out)
     head = 0
     while head < tail:
         y, x = queue[head, 0], queue[head, 1]
         head += 1
         for k in range(4):
-            ny = y + (1 if k == 0 else -1 if k == 1 else 0)
-            nx = x + (1 if k == 2 else -1 if k == 3 else 0)
+            ny, nx = _beside(y, x, k)
             if ny < 0 or nx < 0 or ny >= h or nx >= w or out[ny, nx] or not own[ny, nx]:
                 continue
             if not abs(depth[ny, nx] - depth[y, x]) < gamma:
@@ -60,20 +77,13 @@ def segment(depth, rendered, own, gamma, tolerance, growth, nearest, out):
 def flood(inside, allowed):
     """Add to `inside` the allowed pixels that hang together with it, side by side."""
     h, w = inside.shape
-    queue = np.empty((h * w, 2), dtype=np.int32)
-    tail = 0
-    for y in range(h):
-        for x in range(w):
-            if inside[y, x]:
-                queue[tail, 0], queue[tail, 1] = y, x
-                tail += 1
+    queue, tail = _listed(inside)
     head = 0
     while head < tail:
         y, x = queue[head, 0], queue[head, 1]
         head += 1
         for k in range(4):
-            ny = y + (1 if k == 0 else -1 if k == 1 else 0)
-            nx = x + (1 if k == 2 else -1 if k == 3 else 0)
+            ny, nx = _beside(y, x, k)
             if ny < 0 or nx < 0 or ny >= h or nx >= w or inside[ny, nx] or not allowed[ny, nx]:
                 continue
             inside[ny, nx] = True

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from support.late import Late
 from support.lost_limb import NOBODY_RESTS, lost_limbs, raised
-from support.stage import Scripted
 
 from pop_core.body.kinematics import joints
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.pipeline import BodyPipeline
-from pop_core.retrieval.default_library import default_library
 from pop_core.tracking.late_limbs import (
     LATEST_S,
     MOST_FAILURES,
@@ -26,11 +24,6 @@ from pop_core.tracking.tracking_config import TrackingConfig
 from pop_core.tracking.warm_start import WarmStart
 
 FRAME_NS = 33_000_000
-
-
-@pytest.fixture(scope='module')
-def pipeline(body: BodyModel) -> BodyPipeline:
-    return BodyPipeline(body, default_library(), Scripted(body))
 
 
 @pytest.fixture(scope='module')

@@ -3,13 +3,11 @@
 import numpy as np
 import pytest
 from support.lost_limb import lost_limbs, raised
-from support.stage import Scripted
 
 from pop_core.body.joints import JOINT_INDEX
 from pop_core.body.kinematics import joints
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.pipeline import BodyPipeline
-from pop_core.retrieval.default_library import default_library
 from pop_core.tracking.body_filter import FilterState
 from pop_core.tracking.rivals import with_limbs_of
 from pop_core.tracking.track import PersonTrack
@@ -18,11 +16,6 @@ from pop_core.tracking.warm_start import WarmStart
 
 KNEE = JOINT_INDEX['left_knee'] - 1
 STEPS = 2
-
-
-@pytest.fixture(scope='module')
-def pipeline(body: BodyModel) -> BodyPipeline:
-    return BodyPipeline(body, default_library(), Scripted(body))
 
 
 @pytest.fixture(scope='module')
