@@ -167,13 +167,13 @@ class BodyFitter:
         coarse = self.coarse.state(winner.state.parameters)
         visibility = see_body(coarse, observation)
         segment = self.steps.segment(visibility.rendered, observation)
-        pairs = self.steps.surface_pairs(
+        pairs, spread = self.steps.surface_pairs(
             coarse, observation, visibility, segment, LATE_SCALES_M[-1])
         energy = BodyEnergy(coarse, observation, winner.belief, self.steps.weights(), pairs)
         blocks = energy.terms(coarse, True)
         energies = {
             'E_J3D': cost_of(blocks[:1]), 'E_prior': cost_of(blocks[PRIOR_BLOCKS]),
-            'E_NN': cost_of(blocks[PAIR_BLOCKS]),
+            'E_NN': cost_of(blocks[PAIR_BLOCKS]) + spread,
             'E_depth': depth_energy(visibility.rendered, observation, segment),
         }
         return BodyFit(

@@ -11,8 +11,8 @@ from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.depth_consistency import Sight, Visibility
 from pop_core.fitting.nearest_kernels import nearest
 from pop_core.fitting.observation import Observation
-from pop_core.fitting.pair_kernels import plane_pairs
-from pop_core.fitting.residuals import Pairs, join_pairs, no_pairs
+from pop_core.fitting.pair_kernels import merge_axes, plane_pairs
+from pop_core.fitting.residuals import Pairs, no_pairs
 
 SKIN_SIGMA_M = 0.010  # clothes, hair and the coarse mesh: never trust a point more than this
 EFFECTIVE_POINTS = 1000.0  # neighbouring pixels err together; so many are worth independent ones
@@ -156,13 +156,17 @@ def _plane_pairs(
         state.body.cloth_m))
 
 
-def tangential_pairs(pairs: Pairs, share: float) -> Pairs:
-    """Return the same pairs as point to point, at a share of their weight.
+def tangential_pairs(pairs: Pairs, share: float) -> tuple[Pairs, float]:
+    """Return the same pairs as point to point, at a share of their weight; merged.
 
     Planes let a limb slide along itself; a weak pull in all directions keeps it from drifting
     while the pose is still wrong. Every third pair stands for three: it is a weak, smooth force.
+
+    Returns:
+        The pairs, those of one vertex merged, and by how much less they cost for that.
     """
-    vertex, target = pairs.vertex[::3], pairs.target[::3]
-    weight = 3.0 * share * pairs.weight[::3]
-    axes = [np.tile(axis, (len(vertex), 1)) for axis in np.eye(3)]
-    return join_pairs([Pairs(vertex, axis, target, weight) for axis in axes])
+    if len(pairs.vertex) == 0:
+        return pairs, 0.0
+    *merged, spread = merge_axes(
+        pairs.vertex[::3], pairs.target[::3], 3.0 * share * pairs.weight[::3])
+    return Pairs(*merged), float(spread)

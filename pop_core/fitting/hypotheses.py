@@ -32,7 +32,7 @@ from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.fitting.ground_contact import ground_pairs
 from pop_core.fitting.levenberg_marquardt import FIRST_DAMPING, cost_of, levenberg_marquardt_step
 from pop_core.fitting.observation import Observation
-from pop_core.fitting.residuals import Pairs, join_pairs
+from pop_core.fitting.residuals import Pairs, join_pairs, merged_pairs
 from pop_core.fitting.robust_loss import geman_mcclure_share
 from pop_core.fitting.seat_contact import find_seat, seat_pairs
 from pop_core.rendering.depth_renderer import RenderedDepth
@@ -95,8 +95,10 @@ class HypothesisSteps:
             visibility = see_body(hypothesis.state, observation)
             if segment is None or k % 2 == 0:
                 segment = self.segment(visibility.rendered, observation)
-            pairs = [self.surface_pairs(
-                hypothesis.state, observation, visibility, segment, scale_m)]
+            # What merged pairs cost less is the same for every step from here.
+            surface, _ = self.surface_pairs(
+                hypothesis.state, observation, visibility, segment, scale_m)
+            pairs = [surface]
             if free_space and self.config.free_space:
                 pairs.append(self._free_space(hypothesis.state, observation, visibility, segment))
             if self.config.seat_contact:
@@ -153,15 +155,16 @@ class HypothesisSteps:
         visibility: Visibility,
         segment: Bool[np.ndarray, 'h w'],
         scale_m: float,
-    ) -> Pairs:
-        """Return the pairs of E_NN, in both directions."""
+    ) -> tuple[Pairs, float]:
+        """Return the pairs of E_NN, in both directions, merged, and how much less they cost."""
         points, parts = thin_points(observation, segment, self.config.surface_points)
         toward = match_points(
             state, visibility, points, parts, scale_m, observation.noise)
         back = match_vertices(state, visibility, scale_m, observation.noise)
         # Point to point fades as the kernel shrinks and normals can be trusted.
-        tangential = tangential_pairs(toward, TANGENTIAL_SHARE * scale_m / WIDEST_M)
-        return join_pairs([toward, tangential, back])
+        tangential, apart = tangential_pairs(toward, TANGENTIAL_SHARE * scale_m / WIDEST_M)
+        planes, off_plane = merged_pairs(join_pairs([toward, back]))
+        return join_pairs([planes, tangential]), apart + off_plane
 
     def weights(self, strength: float = 1.0, joints: float = 1.0) -> TermWeights:
         """Return the weights of keypoints and of priors of some strength."""

@@ -44,40 +44,64 @@ def plane_pairs(
 
 
 @njit(cache=True, nogil=True)
-def merge(vertex, direction, target, weight):
-    """Return (vertex, direction, target, weight) of one pair per vertex, and what it costs less.
-
-    Targets are weighted means, weights sums; vertices without any weight are left out. Directions
-    are those of a vertex's first pair: they must be the same for all of them.
+def _means(vertex, target, weight):
+    """Return (first, row, mean, sum): the first pair of each vertex that weighs anything, the row
+    of each pair's vertex among those, and each one's weighted mean of targets and sum of weights.
     """
     n = vertex.shape[0]
     row_of = np.full(vertex.max() + 1, -1)
-    first = np.empty(n, dtype=np.int64)
+    first, row = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     count = 0
     for i in range(n):
         if weight[i] > 0.0 and row_of[vertex[i]] < 0:
             row_of[vertex[i]] = count
             first[count] = i
             count += 1
-    out_vertex = vertex[first[:count]]
-    out_direction = direction[first[:count]]
-    out_target = np.zeros((count, 3))
-    out_weight = np.zeros(count)
+    mean, total = np.zeros((count, 3)), np.zeros(count)
     for i in range(n):
-        row = row_of[vertex[i]]
+        row[i] = row_of[vertex[i]]
         if weight[i] > 0.0:
-            out_weight[row] += weight[i]
+            total[row[i]] += weight[i]
             for c in range(3):
-                out_target[row, c] += weight[i] * target[i, c]
-    for row in range(count):
+                mean[row[i], c] += weight[i] * target[i, c]
+    for k in range(count):
         for c in range(3):
-            out_target[row, c] /= out_weight[row]
+            mean[k, c] /= total[k]
+    return first[:count], row, mean, total
+
+
+@njit(cache=True, nogil=True)
+def merge(vertex, direction, target, weight):
+    """Return (vertex, direction, target, weight) of one pair per vertex, and what it costs less.
+
+    Targets are weighted means, weights sums; vertices without any weight are left out. Directions
+    are those of a vertex's first pair: they must be the same for all of them.
+    """
+    first, row, mean, total = _means(vertex, target, weight)
     spread = 0.0
-    for i in range(n):
-        row = row_of[vertex[i]]
+    for i in range(vertex.shape[0]):
         if weight[i] > 0.0:
             apart = 0.0
             for c in range(3):
-                apart += direction[i, c] * (target[i, c] - out_target[row, c])
+                apart += direction[i, c] * (target[i, c] - mean[row[i], c])
             spread += 0.5 * weight[i] * apart * apart
-    return out_vertex, out_direction, out_target, out_weight, spread
+    return vertex[first], direction[first], mean, total, spread
+
+
+@njit(cache=True, nogil=True)
+def merge_axes(vertex, target, weight):
+    """Return `merge` of pairs that pull along x, y and z alike: three rows per vertex."""
+    first, row, mean, total = _means(vertex, target, weight)
+    spread = 0.0
+    for i in range(vertex.shape[0]):
+        if weight[i] > 0.0:
+            for c in range(3):
+                spread += 0.5 * weight[i] * (target[i, c] - mean[row[i], c]) ** 2
+    count = first.shape[0]
+    out_vertex, axis = np.empty(3 * count, dtype=np.int64), np.zeros((3 * count, 3))
+    out_target, out_weight = np.empty((3 * count, 3)), np.empty(3 * count)
+    for k in range(3 * count):
+        out_vertex[k], out_weight[k] = vertex[first[k % count]], total[k % count]
+        out_target[k] = mean[k % count]
+        axis[k, k // count] = 1.0
+    return out_vertex, axis, out_target, out_weight, spread

@@ -8,10 +8,16 @@ from pop_core.body.joints import JOINT_INDEX
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.depth_noise import BASE_M, DepthNoise
 from pop_core.fitting.body_state import CLOTH_M, HAIR_M, BodyState, FitBody
-from pop_core.fitting.correspondence import match_points, nearest_as_sensors_err, thin_points
+from pop_core.fitting.correspondence import (
+    match_points,
+    nearest_as_sensors_err,
+    tangential_pairs,
+    thin_points,
+)
 from pop_core.fitting.depth_consistency import see_body
 from pop_core.fitting.observation import Observation, observe
-from pop_core.fitting.residuals import Pairs
+from pop_core.fitting.levenberg_marquardt import assemble
+from pop_core.fitting.residuals import Pairs, join_pairs, no_pairs, pair_residual
 from pop_core.rendering.depth_renderer import render_depth
 from pop_core.rgbd import RgbdFrame
 
@@ -92,3 +98,23 @@ def test_hands_and_faces_are_bare_and_crowns_have_hair(state: BodyState) -> None
     assert depth_m[state.vertices[:, 1].argmin()] == pytest.approx(HAIR_M)  # y points down
     chest = state.body.main_bone == JOINT_INDEX['spine3']
     np.testing.assert_allclose(depth_m[chest], CLOTH_M, atol=1e-12)
+
+
+def test_point_to_point_pulls_along_every_axis_with_a_third_of_the_points(
+    state: BodyState
+) -> None:
+    rng = np.random.default_rng(6)
+    vertex = rng.integers(0, 50, 300)
+    weight = np.where(vertex == vertex[0], 0.0, rng.uniform(0.0, 100.0, 300))
+    pairs = Pairs(vertex, state.normals[vertex], rng.normal(size=(300, 3)), weight)
+    every = join_pairs([
+        Pairs(vertex[::3], np.tile(axis, (100, 1)), pairs.target[::3], 3.0 * 0.2 * weight[::3])
+        for axis in np.eye(3)])
+    merged, spread = tangential_pairs(pairs, 0.2)
+    assert len(merged.vertex) == 3 * (len(np.unique(vertex[::3])) - 1)  # of some, without weight
+    many, few = (assemble([pair_residual(state, p, jacobian=True)], state.body.size)
+                 for p in (every, merged))
+    np.testing.assert_allclose(few.gradient, many.gradient, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(few.hessian, many.hessian, rtol=1e-9, atol=1e-6)
+    assert few.cost + spread == pytest.approx(many.cost, rel=1e-9)
+    assert tangential_pairs(no_pairs(), 0.2)[1] == 0.0
