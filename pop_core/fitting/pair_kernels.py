@@ -45,8 +45,10 @@ def plane_pairs(
 
 @njit(cache=True, nogil=True)
 def _means(vertex, target, weight):
-    """Return (first, row, mean, sum): the first pair of each vertex that weighs anything, the row
-    of each pair's vertex among those, and each one's weighted mean of targets and sum of weights.
+    """Return (first, row, mean, total) of the vertices whose pairs weigh anything.
+
+    The first pair of each, the row of every pair's vertex among them (-1: weighs nothing), the
+    weighted mean of each one's targets and the sum of its weights.
     """
     n = vertex.shape[0]
     row_of = np.full(vertex.max() + 1, -1)

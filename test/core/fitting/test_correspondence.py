@@ -15,8 +15,8 @@ from pop_core.fitting.correspondence import (
     thin_points,
 )
 from pop_core.fitting.depth_consistency import see_body
-from pop_core.fitting.observation import Observation, observe
 from pop_core.fitting.levenberg_marquardt import assemble
+from pop_core.fitting.observation import Observation, observe
 from pop_core.fitting.residuals import Pairs, join_pairs, no_pairs, pair_residual
 from pop_core.rendering.depth_renderer import render_depth
 from pop_core.rgbd import RgbdFrame
