@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 TINY = 1e-12
+APART_M = 1e-9
 
 
 @njit(cache=True, nogil=True)
@@ -43,3 +44,32 @@ def closest_shares(ends, pairs):
         shares[k, 0], shares[k, 1] = s, t
         distance[k] = np.sqrt(max(square, 0.0))
     return shares, distance
+
+
+@njit(cache=True, nogil=True)
+def overlaps(ends, radius, pairs):
+    """Return (pair, share, depth, away) of the pairs of capsules that overlap.
+
+    ends (2,n,3) of their axes [m], radius (n) [m], pairs (p,2). Share (m,2) is where the nearest
+    points lie along the axes, depth (m) the sum of radii minus their distance [m], away (m,3) the
+    direction from the second axis to the first. Axes that cross have none, and one step moves them
+    off each other.
+    """
+    every, distance = closest_shares(ends, pairs)
+    rows = np.empty(pairs.shape[0], dtype=np.int64)
+    count = 0
+    for k in range(pairs.shape[0]):
+        if radius[pairs[k, 0]] + radius[pairs[k, 1]] > distance[k]:
+            rows[count] = k
+            count += 1
+    depth, away = np.empty(count), np.empty((count, 3))
+    for m in range(count):
+        k = rows[m]
+        i, j = pairs[k, 0], pairs[k, 1]
+        s, t = every[k, 0], every[k, 1]
+        depth[m] = radius[i] + radius[j] - distance[k]
+        for c in range(3):
+            of_first = ends[0, i, c] + s * (ends[1, i, c] - ends[0, i, c])
+            of_second = ends[0, j, c] + t * (ends[1, j, c] - ends[0, j, c])
+            away[m, c] = (of_first - of_second) / max(distance[k], APART_M)
+    return pairs[rows[:count]], every[rows[:count]], depth, away

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pop_core.body.joints import JOINT_NAMES, MIRROR
+from pop_core.geometry import swing_twist_kernels as kernels
 from pop_core.geometry.swing_twist import to_swing_twist
 
 # Joint without side: twist axis, then lower and upper bounds about x, y, z of the left joint.
@@ -62,4 +63,4 @@ def mirrored_pose(body_pose: Float[np.ndarray, '*n 23 3']) -> Float[np.ndarray, 
 
 def limit_excess(coordinates: Float[np.ndarray, '23 3']) -> Float[np.ndarray, '23 3']:
     """Return the signed excess [rad] of each coordinate beyond its limits, zero within them."""
-    return np.maximum(coordinates - UPPER, 0.0) + np.minimum(coordinates - LOWER, 0.0)
+    return np.asarray(kernels.excess(coordinates, LOWER, UPPER))

@@ -111,6 +111,7 @@ class BodyState:
         places = attached_places(self.body.landmarks, self.skeleton, parameters.betas)
         return parameters.scale * places + parameters.transl
 
+    @cached_property
     def landmark_jacobian(self) -> Float[np.ndarray, 's 3 x']:
         """Return the derivative of the shared points."""
         body = self.body

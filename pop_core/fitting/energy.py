@@ -25,7 +25,7 @@ from pop_core.fitting.residuals import (
     ray_residual,
     ray_weight,
 )
-from pop_core.fitting.robust_loss import Kernel, geman_mcclure_weight
+from pop_core.fitting.robust_loss import Power
 from pop_core.fitting.self_collision import collision_residual
 from pop_core.retrieval.pose_prior import PosePrior
 
@@ -79,16 +79,16 @@ class BodyEnergy:
         weights: TermWeights,
         pairs: Pairs | None = None,
         *,
-        kernel: Kernel = geman_mcclure_weight,
+        power: Power = Power.STEP,
     ) -> None:
-        """Freeze robust weights at `state`: those of a step, or the kernel's own to compare."""
+        """Freeze robust weights at `state`: those of a step, or those bodies are compared by."""
         self.observation, self.belief, self.weights, self.pairs = (
             observation, belief, weights, pairs)
         lifted, rays = observation.lifted, observation.keypoint_rays
         self.joint_weight = weights.joints * joint_weight(
-            state, lifted, weights.robust_m, kernel)
-        self.ray_weight = weights.joints * ray_weight(state, rays, kernel)
-        self.scale_weight = scale_weight(state, kernel)
+            state, lifted, weights.robust_m, power)
+        self.ray_weight = weights.joints * ray_weight(state, rays, power)
+        self.scale_weight = scale_weight(state, power)
 
     def terms(self, state: BodyState, jacobian: bool) -> list[Term]:
         """Return every term at a state."""

@@ -7,13 +7,16 @@ also climb and sit on high chairs; standing below the floor is forbidden.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from jaxtyping import Float, Int
 
 from pop_core.body.joints import JOINT_INDEX, SHARED_INDEX
 from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.ground_kernels import contact
 from pop_core.fitting.residuals import Pairs
-from pop_core.fitting.robust_loss import Kernel, geman_mcclure_weight
+from pop_core.fitting.robust_loss import Power
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.segmentation.ground import Ground
 
@@ -21,14 +24,16 @@ BELOW_SIGMA_M = 0.01
 CONTACT_SIGMA_M = 0.03
 CONTACT_SCALE_M = 0.30  # feet higher than this above the floor are not on it
 TOLERANCE_M = 0.02  # the floor is an estimate too
-ANKLES = (SHARED_INDEX['left_ankle'], SHARED_INDEX['right_ankle'])
+BELOW_WEIGHT, FOOT_WEIGHT = 100.0, 4.0  # of a whole body below the floor, of a sole above it
+LIFTED_SHARE = 0.3  # one foot carries the person; the other may be in the air
+ANKLES = [SHARED_INDEX['left_ankle'], SHARED_INDEX['right_ankle']]
 
 
 def ground_pairs(
     state: BodyState,
     ground: Ground,
     lifted: LiftedJoints,
-    kernel: Kernel = geman_mcclure_weight,
+    power: Power = Power.STEP,
 ) -> Pairs:
     """Return where vertices below the floor and unseen soles above it should go.
 
@@ -36,30 +41,23 @@ def ground_pairs(
         state: Body.
         ground: The floor.
         lifted: Tells which feet are seen: those stand where they are seen.
-        kernel: Robust weight of a sole's height: a step's, or the kernel's own to compare.
+        power: Of the robust share of a sole's height: a step's, or that bodies are compared by.
     """
-    height = ground.height(state.vertices)
-    below = np.flatnonzero(height < -TOLERANCE_M)
-    # Meshes of any density push alike.
-    weight = np.full(len(below), 100.0 / len(height) / BELOW_SIGMA_M**2)
-    vertices, weights = [below], [weight]
-    contact = [height[sole].mean() for sole in state.body.soles]
     upright = min(max(2.0 * uprightness(state, ground) - 0.5, 0.0), 1.0)
-    for ankle, sole, foot_height in zip(ANKLES, state.body.soles, contact, strict=True):
-        if lifted.lifted[ankle]:
-            continue
-        # One foot carries the person; the other may be in the air.
-        carries = 1.0 if foot_height <= min(contact) else 0.3
-        worth = 4.0 * upright * carries / CONTACT_SIGMA_M**2 / len(sole)
-        vertices.append(sole)
-        weights.append(worth * kernel(height[sole], CONTACT_SCALE_M))
-    return onto_plane(state, np.concatenate(vertices), ground, np.concatenate(weights))
+    unseen = np.isnan(lifted.positions_camera[ANKLES, 0])
+    foot_weight = np.where(unseen, FOOT_WEIGHT * upright / CONTACT_SIGMA_M**2, -1.0)
+    # Meshes of any density push alike.
+    below_weight = BELOW_WEIGHT / len(state.vertices) / BELOW_SIGMA_M**2
+    return Pairs(*contact(
+        state.vertices, ground.normal, ground.offset_m, TOLERANCE_M, below_weight,
+        *state.body.soles, foot_weight, LIFTED_SHARE, CONTACT_SCALE_M, int(power)))
 
 
 def uprightness(state: BodyState, ground: Ground) -> float:
     """Return the cosine between the trunk and the floor's normal: people who lie do not stand."""
-    trunk = state.joints[JOINT_INDEX['neck']] - state.joints[JOINT_INDEX['pelvis']]
-    return float(trunk @ ground.normal / np.linalg.norm(trunk))
+    p = state.skeleton.p
+    trunk = p[JOINT_INDEX['neck']] - p[JOINT_INDEX['pelvis']]
+    return float(trunk @ ground.normal) / math.sqrt(trunk @ trunk)
 
 
 def onto_plane(

@@ -33,7 +33,7 @@ from pop_core.fitting.ground_contact import ground_pairs
 from pop_core.fitting.levenberg_marquardt import FIRST_DAMPING, cost_of, levenberg_marquardt_step
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import Pairs, join_pairs, merged_pairs
-from pop_core.fitting.robust_loss import geman_mcclure_share
+from pop_core.fitting.robust_loss import Power
 from pop_core.fitting.seat_contact import find_seat, seat_pairs
 from pop_core.rendering.depth_renderer import RenderedDepth
 from pop_core.segmentation.body_segmentation import SegmentationConfig, segment_body
@@ -120,10 +120,10 @@ class HypothesisSteps:
             floor = None
             if observation.ground is not None:
                 floor = ground_pairs(
-                    hypothesis.state, observation.ground, observation.lifted, geman_mcclure_share)
+                    hypothesis.state, observation.ground, observation.lifted, Power.COMPARED)
             energy = BodyEnergy(
                 hypothesis.state, observation, hypothesis.belief, self.weights(), floor,
-                kernel=geman_mcclure_share)
+                power=Power.COMPARED)
             rendered = render_body(hypothesis.state, observation)
             depth = depth_energy(rendered, observation, segment)
             hypothesis.cost = DEPTH_SCORE * depth + cost_of(

@@ -44,6 +44,16 @@ def plane_pairs(
 
 
 @njit(cache=True, nogil=True)
+def offsets(vertices, vertex, direction, target):
+    """Return direction . (vertices[vertex] - target) of every pair (n) [m]."""
+    out = np.zeros(vertex.shape[0])
+    for i in range(vertex.shape[0]):
+        for c in range(3):
+            out[i] += direction[i, c] * (vertices[vertex[i], c] - target[i, c])
+    return out
+
+
+@njit(cache=True, nogil=True)
 def _means(vertex, target, weight):
     """Return (first, row, mean, total) of the vertices whose pairs weigh anything.
 

@@ -6,17 +6,19 @@ solver's left increments.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from pop_core.body.joint_limits import TWIST_AXES, limit_excess
+from pop_core.fitting import prior_kernels as kernels
 from pop_core.fitting.body_state import BODY_POSE, BodyState
 from pop_core.fitting.levenberg_marquardt import Quadratic
-from pop_core.fitting.robust_loss import Kernel
-from pop_core.geometry.rotation import from_rotvec, left_jacobian_inverse, to_rotvec
-from pop_core.geometry.swing_twist import swing_twist_jacobian
+from pop_core.fitting.robust_kernels import geman_mcclure
+from pop_core.fitting.robust_loss import Power
+from pop_core.geometry.rotation import from_rotvec, to_rotvec
 from pop_core.retrieval.candidate import PoseCandidate
 from pop_core.retrieval.pose_prior import PosePrior
 
@@ -38,10 +40,12 @@ def pose_prior_term(
 def limit_prior_term(state: BodyState, *, jacobian: bool) -> Quadratic:
     """Return by how much joints exceed their anatomical limits."""
     r = limit_excess(state.coordinates)
-    if not jacobian or not r.any():
-        return Quadratic(0.5 * float(np.sum(r * r)) / LIMIT_SIGMA_RAD**2)
-    J = swing_twist_jacobian(state.coordinates, TWIST_AXES) * (r != 0.0)[:, :, None]
-    return _of_joints(r, J, 1 / LIMIT_SIGMA_RAD**2)
+    weight = 1 / LIMIT_SIGMA_RAD**2
+    cost = 0.5 * weight * float(np.vdot(r, r))
+    if not jacobian or cost == 0.0:
+        return Quadratic(cost)
+    gradient, hessian = kernels.excess_model(r, state.coordinates, TWIST_AXES, weight)
+    return Quadratic(cost, gradient, hessian, BODY_POSE.start)
 
 
 def neighbour_sigma_rad(
@@ -71,20 +75,21 @@ def conditional_prior_term(
     """Return the rotation from the retrieved pose, in units of the neighbours' spread."""
     if weight == 0.0:
         return Quadratic(0.0)
-    turn = to_rotvec(state.skeleton.R_local[1:] @ from_rotvec(pose).transpose(0, 2, 1))
-    r = turn / sigma_rad[:, None]
+    r = kernels.turns(state.skeleton.R_local[1:], pose, sigma_rad)
+    cost = 0.5 * weight * float(np.vdot(r, r))
     if not jacobian:
-        return Quadratic(0.5 * weight * float(np.sum(r * r)))
-    return _of_joints(r, left_jacobian_inverse(turn) / sigma_rad[:, None, None], weight)
+        return Quadratic(cost)
+    gradient, hessian = kernels.turns_model(r, sigma_rad, weight)
+    return Quadratic(cost, gradient, hessian, BODY_POSE.start)
 
 
-def scale_weight(state: BodyState, kernel: Kernel) -> float:
+def scale_weight(state: BodyState, power: Power) -> float:
     """Return the robust weight of the scale prior: adults vary little, children much.
 
     It is robust to the small side only: there are children, but no giants.
     """
-    deviation = max(-np.log(state.parameters.scale), 0.0) / SCALE_SIGMA
-    return float(kernel(np.array([deviation]), SCALE_TAIL)[0])
+    deviation = max(-math.log(state.parameters.scale), 0.0) / SCALE_SIGMA
+    return float(geman_mcclure(deviation**2, SCALE_TAIL, int(power)))
 
 
 def shape_prior_term(state: BodyState, of_scale: float) -> Quadratic:
@@ -95,21 +100,11 @@ def shape_prior_term(state: BodyState, of_scale: float) -> Quadratic:
         of_scale: Weight of the scale.
     """
     parameters = state.parameters
-    weight = np.append(np.ones(len(parameters.betas)), of_scale / SCALE_SIGMA**2)
-    at = np.append(parameters.betas, np.log(parameters.scale))
-    pull = weight * at
-    return Quadratic(
-        0.5 * float(at @ pull), pull, np.diag(weight), BODY_POSE.stop)
-
-
-def _of_joints(
-    r: Float[np.ndarray, '23 3'], J: Float[np.ndarray, '23 3 3'], weight: float
-) -> Quadratic:
-    """Return the term of residuals that depend on the rotation of one joint each."""
-    gradient = weight * np.einsum('jab,ja->jb', J, r).reshape(-1)
-    hessian = np.zeros((len(r), 3, len(r), 3))
-    joint = np.arange(len(r))
-    hessian[joint, :, joint, :] = weight * (J.transpose(0, 2, 1) @ J)
-    return Quadratic(
-        0.5 * weight * float(np.sum(r * r)), gradient, hessian.reshape(r.size, r.size),
-        BODY_POSE.start)
+    weight = of_scale / SCALE_SIGMA**2
+    log_scale = math.log(parameters.scale)
+    pull = np.empty(len(parameters.betas) + 1)
+    pull[:-1], pull[-1] = parameters.betas, weight * log_scale
+    hessian = np.eye(len(pull))
+    hessian[-1, -1] = weight
+    square = float(np.vdot(parameters.betas, parameters.betas)) + weight * log_scale**2
+    return Quadratic(0.5 * square, pull, hessian, BODY_POSE.stop)

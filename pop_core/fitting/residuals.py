@@ -11,50 +11,44 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from pop_core.fitting import keypoint_kernels
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.levenberg_marquardt import Residual, no_residual
 from pop_core.fitting.observation import KeypointRays
-from pop_core.fitting.pair_kernels import merge
-from pop_core.fitting.robust_loss import Kernel
+from pop_core.fitting.pair_kernels import merge, offsets
+from pop_core.fitting.robust_loss import Power
 from pop_core.keypoints.lifted_joints import LiftedJoints
 
 RAY_SCALE_M = 0.4  # a guessed pixel may be on another limb
 
 
 def joint_weight(
-    state: BodyState, lifted: LiftedJoints, scale_m: float, kernel: Kernel
+    state: BodyState, lifted: LiftedJoints, scale_m: float, power: Power
 ) -> Float[np.ndarray, 's']:
     """Return the robust weight 1/sigma^2 of every shared joint, zero unless lifted."""
-    distance = np.linalg.norm(state.landmarks - lifted.positions_camera, axis=1)
-    robust = kernel(np.where(lifted.lifted, distance, 0.0), scale_m)
-    return np.where(lifted.lifted, robust / lifted.sigma_m**2, 0.0)
+    return np.asarray(keypoint_kernels.joint_weights(
+        state.landmarks, lifted.positions_camera, lifted.sigma_m, scale_m, int(power)))
 
 
 def joint_residual(
     state: BodyState, lifted: LiftedJoints, weight: Float[np.ndarray, 's'], *, jacobian: bool
 ) -> Residual:
     """Return E_J3D: offsets of the shared points from the lifted joints (Eq. 2)."""
-    rows = np.flatnonzero(weight > 0)
-    if len(rows) == 0:
-        return no_residual(state.body.size)
-    difference = (state.landmarks[rows] - lifted.positions_camera[rows]).reshape(-1)
-    J = state.landmark_jacobian()[rows].reshape(-1, state.body.size) if jacobian else None
-    return Residual(difference, J, np.repeat(weight[rows], 3))
+    rows, r, w = keypoint_kernels.joint_offsets(state.landmarks, lifted.positions_camera, weight)
+    J = state.landmark_jacobian[rows].reshape(-1, state.body.size) if jacobian else None
+    return Residual(r, J, w)
 
 
 def ray_weight(
-    state: BodyState, rays: KeypointRays, kernel: Kernel
+    state: BodyState, rays: KeypointRays, power: Power
 ) -> Float[np.ndarray, 's']:
     """Return the weight 1/sigma^2 of keypoints that have a pixel but no depth, zero elsewhere.
 
     A detector's pixel of a hidden joint fixes its direction though nothing fixes its distance.
     """
-    weight = np.zeros(len(state.landmarks))
-    points = state.landmarks[rays.joint]
-    sigma_m = rays.sigma * np.maximum(points[:, 2], 0.3)
-    distance = np.linalg.norm(np.einsum('nkc,nc->nk', rays.across, points), axis=1)
-    weight[rays.joint] = rays.score * kernel(distance, RAY_SCALE_M) / sigma_m**2
-    return weight
+    return np.asarray(keypoint_kernels.ray_weights(
+        state.landmarks, rays.joint, rays.across, rays.score, rays.sigma, RAY_SCALE_M,
+        int(power)))
 
 
 def ray_residual(
@@ -63,12 +57,11 @@ def ray_residual(
     """Return the distance of shared points to the rays of their keypoints, in two directions."""
     if len(rays.joint) == 0:
         return no_residual(state.body.size)
-    distance = np.einsum('nkc,nc->nk', rays.across, state.landmarks[rays.joint])
+    distance = keypoint_kernels.ray_offsets(state.landmarks, rays.joint, rays.across)
     J = None
     if jacobian:
-        J = np.einsum('nkc,ncx->nkx', rays.across, state.landmark_jacobian()[rays.joint])
-        J = J.reshape(2 * len(rays.joint), state.body.size)
-    return Residual(distance.reshape(-1), J, np.repeat(weight[rays.joint], 2))
+        J = (rays.across @ state.landmark_jacobian[rays.joint]).reshape(-1, state.body.size)
+    return Residual(distance.reshape(-1), J, weight[rays.joint].repeat(2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,7 +117,6 @@ def merged_pairs(pairs: Pairs) -> tuple[Pairs, float]:
 
 def pair_residual(state: BodyState, pairs: Pairs, *, jacobian: bool) -> Residual:
     """Return E_NN: offsets of vertices from their targets along each pair's direction."""
-    offset = state.vertices[pairs.vertex] - pairs.target
-    r = np.einsum('nc,nc->n', pairs.direction, offset)
+    r = offsets(state.vertices, pairs.vertex, pairs.direction, pairs.target)
     J = state.directional_jacobian(pairs.vertex, pairs.direction) if jacobian else None
     return Residual(r, J, pairs.weight)

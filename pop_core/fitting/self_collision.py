@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from pop_core.body.capsule_kernels import closest_shares
+from pop_core.body.capsule_kernels import overlaps
 from pop_core.body.capsules import BodyCapsules
 from pop_core.body.kinematics import attached_jacobian, attached_places
+from pop_core.body.model import AttachedPoints
 from pop_core.fitting.body_state import BodyState, betas_slice
 from pop_core.fitting.levenberg_marquardt import Residual, no_residual
 
@@ -43,17 +44,8 @@ def find_overlaps(state: BodyState) -> Overlaps:
     capsules, parameters = state.body.capsules, state.parameters
     ends = parameters.transl + parameters.scale * attached_places(
         capsules.ends, state.skeleton, parameters.betas)
-    ends = ends.reshape(2, -1, 3)
-    share, distance = closest_shares(ends, capsules.pairs)
-    radius = _radius(capsules, state)
-    depth = radius[capsules.pairs].sum(axis=1) - distance
-    rows = np.flatnonzero(depth > 0)
-    pair, share = capsules.pairs[rows], share[rows]
-    nearest = ends[0, pair] + share[:, :, None] * (ends[1, pair] - ends[0, pair])
-    offset = nearest[:, 0] - nearest[:, 1]
-    # Axes that cross have no direction apart, and one step moves them off each other.
-    away = offset / np.maximum(distance[rows], 1e-9)[:, None]
-    return Overlaps(pair, share, depth[rows], away)
+    return Overlaps(*overlaps(
+        ends.reshape(2, -1, 3), _radius(capsules, state), capsules.pairs))
 
 
 def collision_residual(state: BodyState, weight: float, *, jacobian: bool) -> Residual:
@@ -64,29 +56,36 @@ def collision_residual(state: BodyState, weight: float, *, jacobian: bool) -> Re
     """
     if weight == 0.0:
         return no_residual(state.body.size)
-    overlaps = find_overlaps(state)
-    w = np.full(len(overlaps.depth_m), weight / OVERLAP_SIGMA_M**2)
-    J = _jacobian(state, overlaps) if jacobian else None
-    return Residual(overlaps.depth_m, J, w)
+    found = find_overlaps(state)
+    w = np.full(len(found.depth_m), weight / OVERLAP_SIGMA_M**2)
+    J = _jacobian(state, found) if jacobian else None
+    return Residual(found.depth_m, J, w)
 
 
-def _jacobian(state: BodyState, overlaps: Overlaps) -> Float[np.ndarray, 'n x']:
+def _jacobian(state: BodyState, found: Overlaps) -> Float[np.ndarray, 'n x']:
     body, parameters = state.body, state.parameters
-    capsules, rows = body.capsules, len(overlaps.depth_m)
-    if rows == 0:
-        return np.zeros((0, body.size))
-    of_ends = attached_jacobian(
-        capsules.ends, body.model, parameters, state.skeleton).reshape(2, -1, 3, body.size)
-    first, second = overlaps.pair.T
-    s, t = overlaps.share.T[..., None, None]
-    apart = (
-        (1 - s) * of_ends[0, first] + s * of_ends[1, first]
-        - (1 - t) * of_ends[0, second] - t * of_ends[1, second])
-    J = -np.einsum('nc,ncx->nx', overlaps.away, apart)
-    J[:, betas_slice(body.model.n_betas)] += (
-        parameters.scale * capsules.radius_shapedirs[overlaps.pair].sum(axis=1))
-    J[:, -1] += _radius(capsules, state)[overlaps.pair].sum(axis=1)
+    capsules, pair = body.capsules, found.pair
+    J = np.zeros((len(pair), body.size))
+    if len(pair):
+        first, second = attached_jacobian(
+            _nearest_points(capsules, found), body.model, parameters, state.skeleton,
+        ).reshape(2, len(pair), 3, body.size)
+        J = np.einsum('nc,ncx->nx', found.away, second - first)
+        J[:, betas_slice(body.model.n_betas)] += (
+            parameters.scale * capsules.radius_shapedirs[pair].sum(axis=1))
+        J[:, -1] += _radius(capsules, state)[pair].sum(axis=1)
     return J
+
+
+def _nearest_points(capsules: BodyCapsules, found: Overlaps) -> AttachedPoints:
+    """Return the nearest points of all overlaps, those of first capsules before the others."""
+    ends, capsule = capsules.ends, found.pair.T.reshape(-1)
+    far = capsule + len(capsules.radius)
+    share = found.share.T.reshape(-1, 1)
+    return AttachedPoints(
+        ends.joint[capsule],
+        ends.template[capsule] * (1 - share) + ends.template[far] * share,
+        ends.shapedirs[capsule] * (1 - share[..., None]) + ends.shapedirs[far] * share[..., None])
 
 
 def _radius(capsules: BodyCapsules, state: BodyState) -> Float[np.ndarray, 'n']:

@@ -62,6 +62,17 @@ def compose(coordinates, twist_axes):
 
 
 @njit(cache=True, nogil=True)
+def excess(coordinates, lower, upper):
+    """Return the signed excess (j,3) of coordinates (j,3) beyond lower and upper limits [rad]."""
+    out = np.empty(coordinates.shape)
+    for j in range(coordinates.shape[0]):
+        for c in range(3):
+            over = max(coordinates[j, c] - upper[j, c], 0.0)
+            out[j, c] = over + min(coordinates[j, c] - lower[j, c], 0.0)
+    return out
+
+
+@njit(cache=True, nogil=True)
 def increment_jacobian(coordinates, twist_axes):
     """Return d(coordinates)/d(delta) (j,3,3) for R <- exp(delta) R, of coordinates (j,3).
 

@@ -17,8 +17,8 @@ from jaxtyping import Bool, Float, Int
 
 from pop_core.body.joint_limits import TWIST_AXES, pose_coordinates
 from pop_core.errors import LibraryFileError
-from pop_core.geometry.block_kernels import sandwich
-from pop_core.geometry.swing_twist import from_swing_twist, swing_twist_jacobian
+from pop_core.geometry.swing_twist import from_swing_twist
+from pop_core.retrieval import pose_prior_kernels as kernels
 
 DEFAULT_FILE = Path(__file__).resolve().parents[1] / 'data' / 'pose_prior.npz'
 N_COORDINATES = 69
@@ -92,7 +92,7 @@ class PosePrior:
         What the component's weight and volume cost above the cheapest component is part of it, so
         that the energy does not jump when another component takes over. It is never below zero.
         """
-        return float(self.component_costs(c.reshape(1, -1)).min() - self.peak_costs.min())
+        return self._nearest(c)[0]
 
     def quadratic(
         self, c: Float[np.ndarray, '23 3']
@@ -101,14 +101,16 @@ class PosePrior:
 
         Derivatives are with respect to left increments R_j <- exp(delta_j) R_j of the 23 joints.
         """
-        costs = self.component_costs(c.reshape(1, -1))[0]
-        best = int(np.argmin(costs))
-        turn = swing_twist_jacobian(c, TWIST_AXES)
-        pull = self.precisions[best] @ (c.reshape(-1) - self.means[best])
-        gradient = np.einsum('jab,ja->jb', turn, pull.reshape(-1, 3)).reshape(-1)
-        return (
-            float(costs[best] - self.peak_costs.min()), gradient,
-            np.asarray(sandwich(self.precisions[best], turn, 0)))
+        cost, best = self._nearest(c)
+        gradient, hessian = kernels.increment_model(
+            c, self.means[best], self.precisions[best], TWIST_AXES)
+        return cost, gradient, hessian
+
+    def _nearest(self, c: Float[np.ndarray, '23 3']) -> tuple[float, int]:
+        """Return `cost`, and the component it is of."""
+        cost, best = kernels.nearest_component(
+            c.reshape(-1), self.means, self.whiteners, self.peak_costs)
+        return float(cost - self.peak_costs.min()), int(best)
 
     def sample(self, rng: np.random.Generator, n: int) -> Float[np.ndarray, 'n 23 3']:
         """Return n poses (rotation vectors [rad]) drawn from the mixture, limits not applied."""

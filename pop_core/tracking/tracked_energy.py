@@ -43,7 +43,7 @@ class Prediction:
         """
         self.parameters = predicted.parameters
         self.information = inverse(predicted.covariance)
-        J = body.landmark_jacobian()
+        J = body.landmark_jacobian
         variance = np.einsum('sax,sax->s', J @ predicted.covariance, J) / 3.0
         self.landmark_sigma_m = np.sqrt(variance)
 

@@ -24,7 +24,7 @@ from pop_core.fitting.residuals import (
     pair_residual,
     ray_residual,
 )
-from pop_core.fitting.robust_loss import geman_mcclure_weight
+from pop_core.fitting.robust_loss import Power
 from pop_core.fitting.self_collision import collision_residual
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.retrieval.pose_prior import load_pose_prior
@@ -123,7 +123,7 @@ def test_shape_prior(state: BodyState) -> None:
 def test_small_people_may_be_children_but_there_are_no_giants(state: BodyState) -> None:
     def weight(scale: float) -> float:
         sized = state.body.state(state.parameters.replaced(scale=scale))
-        return scale_weight(sized, geman_mcclure_weight)
+        return scale_weight(sized, Power.STEP)
 
     assert weight(1.3) == weight(1.0) == 1.0
     assert weight(0.7) < 0.1 < weight(0.95)
