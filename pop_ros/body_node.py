@@ -1,8 +1,8 @@
 """The node `pop` itself: life cycle, inputs, worker, outputs, parameters, services, diagnostics.
 
-Callbacks only store; one worker thread fits the newest pair and publishes, another asks the
-keypoint source meanwhile. The executor is single-threaded because rclpy's multi-threaded one
-spends a core on waiting.
+Callbacks only store; a worker thread fits the newest pair and publishes, and has other processes
+ask the keypoint source and find people meanwhile. The executor is single-threaded because rclpy's
+multi-threaded one spends a core on waiting.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ class PopNode(LifecycleNode):
         for text in (*reasons(detector), *self._outputs.missing):
             self.log.info(text)
         self._work = FrameWork(
-            self, self._settings, detector, self._frames, self._outputs, self._statistics)
+            self, self._settings, self._arguments, self._frames, self._outputs, self._statistics)
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, _state: LifecycleState) -> TransitionCallbackReturn:
@@ -150,7 +150,7 @@ class PopNode(LifecycleNode):
         if self.stop():
             return TransitionCallbackReturn.SUCCESS
         self.log.error(
-            f'the frame in work, or the look for people, did not end within {STOP_S:.0f} s')
+            f'the frame in work did not end within {STOP_S:.0f} s')
         return TransitionCallbackReturn.ERROR
 
     # Services and parameters

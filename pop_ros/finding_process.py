@@ -1,8 +1,9 @@
 """A process that finds people, or their lost limbs, while the node follows them.
 
 A second thread would share the interpreter with the one that follows, and make it half as fast.
-Jobs and answers are pickles on the two pipes of a child: it ends when the pipes do, so nothing is
-left of a node that was killed.
+What the work is done with is made there: a pipeline for fits, a keypoint source for looks. Jobs
+and answers are pickles on the two pipes of a child: it ends when the pipes do, so nothing is left
+of a node that was killed.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from functools import lru_cache
+from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
 from threadpoolctl import ThreadpoolController
@@ -28,41 +31,78 @@ from pop_core.rgbd import RgbdFrame
 from pop_ros.sources import make_pipeline
 
 AnswerT = TypeVar('AnswerT')
-NICENESS = 10  # where processors are scarce those who are followed go first
+FITTING_NICENESS = 10  # where processors are scarce those who are followed go first
 # Without caches the first answer takes minutes, any other a part of a second.
 FIRST_PATIENCE_S, PATIENCE_S = 600.0, 30.0
 # Not `-m`, which would look for modules in the working directory before all others.
-PROGRAM = ('import sys; sys.path[:] = sys.argv[1:]; '
-           'from pop_ros.finding_process import main; main()')
+PROGRAM = ('import sys; niceness, *sys.path[:] = sys.argv[1:]; '
+           'from pop_ros.finding_process import main; main(int(niceness))')
+AUTOGROUP = Path('/proc/self/autogroup')
+Equip = Callable[[PipelineConfig], Any]
 
 
 class FindingError(PopError):
-    """The process that fits people ended, or is none to be had."""
+    """The process that finds people ended, or is none to be had."""
+
+
+class Nobody:
+    """A keypoint source for a pipeline that is given its detections."""
+
+    def detect(self, _frame: RgbdFrame) -> list[Detection]:
+        """Return no people."""
+        return []
+
+
+@lru_cache(maxsize=1)
+def _loaded() -> BodyPipeline:
+    return make_pipeline(Nobody())
+
+
+@lru_cache(maxsize=1)
+def fitting_pipeline(config: PipelineConfig) -> BodyPipeline:
+    """Return a pipeline that fits people who are already detected."""
+    loaded = _loaded()
+    return BodyPipeline(loaded.model, loaded.library, Nobody(), config, loaded.fitter.prior)
 
 
 class FindingProcess:
-    """A process with a pipeline of its own; one that ended is replaced for the next person."""
+    """A process with what it works with; one that ended is replaced for the next person."""
 
-    def __init__(self) -> None:
-        """Start nothing yet."""
+    def __init__(
+        self, equip: Equip = fitting_pipeline, niceness: int = FITTING_NICENESS
+    ) -> None:
+        """Start nothing yet.
+
+        Args:
+            equip: Makes there, of the settings, what work is done with; pickled.
+            niceness: How far the process stands back where processors are scarce.
+        """
+        self._equip, self._niceness = equip, niceness
         self._config = PipelineConfig()
         self._process: subprocess.Popen[bytes] | None = None
         self._has_answered = self._is_stopped = False
+        self._asked_s: float | None = None
         # So that no process is started while another thread stops the last one.
         self._lock = threading.Lock()
         # A thread waits for the answers, and asks in order.
         self._waiting = ThreadPoolExecutor(1, 'pop finding people')
+
+    @property
+    def busy_s(self) -> float:
+        """Return for how long the same answer is waited for [s]; loading does not count."""
+        asked_s = self._asked_s
+        return 0.0 if asked_s is None else time.monotonic() - asked_s
 
     def configure(self, config: PipelineConfig) -> None:
         """Use these settings from the next person on."""
         self._config = config
 
     def start(self) -> None:
-        """Load body and library there; the first person would wait for them."""
+        """Load there what work is done with; the first person would wait for it."""
         self.submit(_nothing)
 
     def submit(self, work: Callable[..., AnswerT], *inputs: Any) -> Future[AnswerT]:
-        """Begin `work(pipeline, *inputs)` there.
+        """Begin `work(equipment, *inputs)` there.
 
         The future fails with `FindingError` if the process ends, and with the error of the work.
 
@@ -70,7 +110,7 @@ class FindingProcess:
             work: A function of a module.
             inputs: What it is given, to be pickled.
         """
-        return self._waiting.submit(self._answer, (self._config, work, inputs))
+        return self._waiting.submit(self._answer, (self._equip, self._config, work, inputs))
 
     def stop(self) -> None:
         """End the process, whatever it does."""
@@ -83,7 +123,12 @@ class FindingProcess:
 
     def _answer(self, job: Any) -> Any:
         data = pickle.dumps(job, protocol=pickle.HIGHEST_PROTOCOL)
-        answer = self._exchange(self._child(), data)
+        child = self._child()
+        self._asked_s = time.monotonic() if self._has_answered else None
+        try:
+            answer = self._exchange(child, data)
+        finally:
+            self._asked_s = None
         self._has_answered = True
         if isinstance(answer, Exception):
             raise answer
@@ -92,9 +137,9 @@ class FindingProcess:
     def _child(self) -> subprocess.Popen[bytes]:
         with self._lock:
             if self._is_stopped:
-                raise FindingError('the process that fits people was stopped')
+                raise FindingError('the process that finds people was stopped')
             if self._process is None or self._process.poll() is not None:
-                self._process, self._has_answered = _started(), False
+                self._process, self._has_answered = _started(self._niceness), False
             return self._process
 
     def _exchange(self, child: subprocess.Popen[bytes], data: bytes) -> Any:
@@ -112,49 +157,31 @@ class FindingProcess:
         except Exception as error:
             child.kill()  # what it says next would be taken for another answer
             raise FindingError(
-                f'the process that fits people ended with code {child.wait()} after '
+                f'the process that finds people ended with code {child.wait()} after '
                 f'{time.monotonic() - asked_s:.1f} s; the next person starts another') from error
         finally:
             watchdog.cancel()
 
 
-def _started() -> subprocess.Popen[bytes]:
+def _started(niceness: int) -> subprocess.Popen[bytes]:
     # In a session of its own: Ctrl-C in a terminal is for the node to answer.
     try:
         return subprocess.Popen(
-            [sys.executable, '-c', PROGRAM, *sys.path], stdin=subprocess.PIPE,
+            [sys.executable, '-c', PROGRAM, str(niceness), *sys.path], stdin=subprocess.PIPE,
             stdout=subprocess.PIPE, start_new_session=True)
     except OSError as error:
         raise FindingError(
-            f'expected a second process to fit people in, found none: {error}') from error
+            f'expected a second process to find people in, found none: {error}') from error
 
 
-class Nobody:
-    """A keypoint source for a pipeline that is given its detections."""
-
-    def detect(self, _frame: RgbdFrame) -> list[Detection]:
-        """Return no people."""
-        return []
+def _nothing(_equipment: Any) -> None:
+    """Do nothing with what has been loaded for it."""
 
 
-@lru_cache(maxsize=1)
-def _loaded() -> BodyPipeline:
-    ThreadpoolController().limit(limits=1, user_api='blas')
-    return make_pipeline(Nobody())
-
-
-@lru_cache(maxsize=1)
-def _pipeline(config: PipelineConfig) -> BodyPipeline:
-    loaded = _loaded()
-    return BodyPipeline(loaded.model, loaded.library, Nobody(), config, loaded.fitter.prior)
-
-
-def _nothing(_pipeline: BodyPipeline) -> None:
-    """Do nothing with a pipeline, which has been loaded for it."""
-
-
-def _done(config: PipelineConfig, work: Callable[..., AnswerT], inputs: Sequence[Any]) -> AnswerT:
-    return work(_pipeline(config), *inputs)
+def _done(
+    equip: Equip, config: PipelineConfig, work: Callable[..., AnswerT], inputs: Sequence[Any]
+) -> AnswerT:
+    return work(equip(config), *inputs)
 
 
 def answer_jobs(jobs: BinaryIO, answers: BinaryIO) -> None:
@@ -173,9 +200,19 @@ def answer_jobs(jobs: BinaryIO, answers: BinaryIO) -> None:
         answers.flush()
 
 
-def main() -> None:
+def _stand_back(niceness: int) -> None:
+    """Give way to other processes, also to those of other sessions."""
+    os.nice(niceness)
+    # Linux shares processors out among sessions first (autogroups), whatever their niceness: this
+    # process, which has a session of its own, would get as much as the whole node.
+    with suppress(OSError):
+        AUTOGROUP.write_text(str(os.nice(0)), encoding='ascii')
+
+
+def main(niceness: int) -> None:
     """Answer on what was the standard output; whatever is printed goes elsewhere."""
-    os.nice(NICENESS)
+    _stand_back(niceness)
+    ThreadpoolController().limit(limits=1, user_api='blas')
     with os.fdopen(os.dup(1), 'wb') as answers:
         os.dup2(2, 1)
         answer_jobs(sys.stdin.buffer, answers)

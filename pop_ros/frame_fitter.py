@@ -17,7 +17,6 @@ from pop_core.tracking.tracker import BodyTracker
 from pop_ros.body_messages import RECORDED_TYPES, BodyMessages, Output
 from pop_ros.frame_maker import FrameMaker
 from pop_ros.keypoint_sources import apply_settings
-from pop_ros.looking_thread import AnswerT, LookingThread
 from pop_ros.node_config import NodeConfig
 from pop_ros.sources import make_pipeline
 from pop_ros.static_frames import StaticFrames, parse_extrinsics
@@ -50,7 +49,7 @@ class FrameFitter:
         frames: StaticFrames | None = None,
         *,
         finding: Background | None = None,
-        looking: LookingThread | None = None,
+        looking: Background | None = None,
         searching: Background | None = None,
     ) -> None:
         """Load body model and pose library, and compile kernels.
@@ -69,7 +68,6 @@ class FrameFitter:
             PopError: If one of them cannot be loaded.
         """
         apply_settings(detector, pipeline_config)
-        self._looking = looking
         self._pipeline = make_pipeline(detector, pipeline_config, progress=progress)
         self._tracker = BodyTracker(
             self._pipeline, config.tracking, finding, looking, searching)
@@ -85,7 +83,7 @@ class FrameFitter:
     def configure(self, pipeline_config: PipelineConfig, config: NodeConfig) -> None:
         """Take over changed settings; model, library and keypoint source stay loaded."""
         old = self._pipeline
-        self._ask(lambda: apply_settings(old.detector, pipeline_config))
+        apply_settings(old.detector, pipeline_config)
         self._pipeline = BodyPipeline(
             old.model, old.library, old.detector, pipeline_config, old.fitter.prior)
         self._tracker.configure(self._pipeline, config.tracking)
@@ -107,7 +105,7 @@ class FrameFitter:
         Raises:
             PopError: If the keypoint source cannot read what it needs for this frame.
         """
-        return self._ask(lambda: self._pipeline.detector.detect(frame))
+        return self._pipeline.detector.detect(frame)
 
     def fit(
         self, color: Any, depth: Any, info: Any, depth_info: Any = None,
@@ -135,7 +133,3 @@ class FrameFitter:
             result = self._pipeline.process(frame)
         outputs = self._messages.stream(result, frame, color.header.frame_id, wanted)
         return FittedFrame(frame, result, outputs)
-
-    def _ask(self, question: Callable[[], AnswerT]) -> AnswerT:
-        """Return the answer to a question about the keypoint source, which hears one at a time."""
-        return question() if self._looking is None else self._looking.submit(question).result()

@@ -12,12 +12,12 @@ from rclpy.task import Future
 
 from pop_core.config import PipelineConfig
 from pop_core.errors import PopError
-from pop_core.keypoints.detection import KeypointDetector
 from pop_ros.finding_process import FindingProcess
 from pop_ros.frame_fitter import FittedFrame, FrameFitter
 from pop_ros.from_messages import stamp_ns
 from pop_ros.inputs import RgbdMessages
-from pop_ros.looking_thread import LookingThread
+from pop_ros.looking import LOOKING_NICENESS, DistantDetector, Looking
+from pop_ros.node_arguments import SourceArguments
 from pop_ros.node_config import NodeConfig
 from pop_ros.node_outputs import NodeOutputs
 from pop_ros.parameters import ConfigParameters
@@ -28,6 +28,7 @@ from pop_ros.worker import Worker
 
 Settings = ConfigParameters[NodeConfig, PipelineConfig]
 PROGRESS_STEP = 0.1
+AFTERWARDS_S = 1.0
 REPLACED, STOPPED = 'replaced by a newer pair', 'stopped before it was fitted'
 NO_FRAME = 'no frame has been fitted yet: somebody must subscribe an output, and images arrive'
 
@@ -41,7 +42,7 @@ class FrameWork:
     """
 
     def __init__(
-        self, node: Node, settings: Settings, detector: KeypointDetector, frames: StaticFrames,
+        self, node: Node, settings: Settings, sources: SourceArguments, frames: StaticFrames,
         outputs: NodeOutputs, statistics: NodeStatistics,
     ) -> None:
         """Start to prepare: load the library and compile kernels, in the worker's thread."""
@@ -55,9 +56,9 @@ class FrameWork:
         self._last_number = 0
         self._said_share = -1.0
         self._finding, self._searching = FindingProcess(), FindingProcess()
-        self._looking = LookingThread()
+        self._looking = FindingProcess(Looking(sources), LOOKING_NICENESS)
         self._worker: Worker[RgbdMessages] = Worker(
-            self._fit, self._on_error, lambda: self._prepare(detector, frames))
+            self._fit, self._on_error, lambda: self._prepare(frames))
         self._worker.start()
 
     # Executor thread
@@ -106,27 +107,29 @@ class FrameWork:
         return answer
 
     def stop(self, timeout_s: float) -> bool:
-        """End the threads; return whether frame and look in work were finished in time."""
+        """End thread and processes; return whether the frame in work was finished in time."""
         self.run(False)
         if self._worker.mailbox.clear():
             self._statistics.add_drop(STOPPED)
-        until_s = time.monotonic() + timeout_s
         finished = self._worker.stop(timeout_s)
-        for process in (self._finding, self._searching):
+        for process in (self._finding, self._searching, self._looking):
             process.stop()
-        return self._looking.stop(max(until_s - time.monotonic(), 0.0)) and finished
+        # A frame that waited for one of them ends now.
+        return finished or self._worker.stop(AFTERWARDS_S)
 
     # Worker thread
 
-    def _prepare(self, detector: KeypointDetector, frames: StaticFrames) -> None:
+    def _prepare(self, frames: StaticFrames) -> None:
         started_s = time.monotonic()
+        self._looking.configure(self._settings.pipeline_config)
+        self._looking.start()
         self._log.info(
             'preparing; the first start generates the pose library and compiles kernels, later '
             'ones read them from the cache')
         fitter = FrameFitter(
-            detector, self._settings.pipeline_config, self._settings.node_config,
-            self._say_progress, frames, finding=self._finding, looking=self._looking,
-            searching=self._searching)
+            DistantDetector(self._looking), self._settings.pipeline_config,
+            self._settings.node_config, self._say_progress, frames, finding=self._finding,
+            looking=self._looking, searching=self._searching)
         self._outputs.publish_model(fitter.model)
         self._configure_finding()
         self._fitter = fitter
@@ -167,6 +170,7 @@ class FrameWork:
             self._configure_finding()
 
     def _configure_finding(self) -> None:
+        self._looking.configure(self._settings.pipeline_config)
         for process in (self._finding, self._searching):
             process.configure(self._settings.pipeline_config)
             if self._settings.node_config.tracking.enabled:

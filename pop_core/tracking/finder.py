@@ -12,7 +12,7 @@ from pop_core.body.model import BodyParameters
 from pop_core.estimate import BodyEstimate, EstimateStatus
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.lifted_joints import LiftedJoints
-from pop_core.keypoints.lifting import lift_keypoints
+from pop_core.keypoints.lifting import LiftingConfig, lift_keypoints
 from pop_core.pipeline import (
     BodyPipeline,
     Scene,
@@ -42,17 +42,19 @@ class Found:
         return [int(index) for index in order if int(index) not in known]
 
 
+def found_people(
+    frame: RgbdFrame, detections: Sequence[Detection], config: LiftingConfig
+) -> Found:
+    """Return detections with their joints, lifted plainly: known people gate them."""
+    return Found(detections, [lift_keypoints(frame, d, config) for d in detections])
+
+
 class Finder:
     """Makes bodies of detections, with the steps of one pipeline."""
 
     def __init__(self, pipeline: BodyPipeline) -> None:
         """Use a pipeline's library, model and settings."""
         self.pipeline = pipeline
-
-    def lift(self, frame: RgbdFrame, detections: Sequence[Detection]) -> Found:
-        """Return detections with their joints, lifted plainly: known people gate them."""
-        lifting = self.pipeline.config.lifting
-        return Found(detections, [lift_keypoints(frame, d, lifting) for d in detections])
 
     def lifted_behind(self, scene: Scene, found: Found, index: int) -> LiftedJoints:
         """Return a person's joints, lifted onto nothing that nearer people explain."""

@@ -68,6 +68,11 @@ class FreshFits:
         self._asked.is_ready = self._asked.future.done()
         return self._asked.is_ready
 
+    def put_off(self) -> None:
+        """Leave a fit that is ready to the next frame."""
+        if self._asked is not None:
+            self._asked.is_ready = False
+
     def ask(
         self, pipeline: BodyPipeline, scene: Scene, detection: Detection, track: int | None, *,
         wait: bool,

@@ -16,39 +16,72 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool
 
+from pop_core.config import PipelineConfig
 from pop_core.depth_noise import DepthNoise, estimate_depth_noise
-from pop_core.keypoints.detection import Detection
+from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.keypoints.undistortion import undistort_detection
-from pop_core.pipeline import BodyPipeline, Scene
+from pop_core.pipeline import Scene
 from pop_core.rgbd import RgbdFrame
 from pop_core.segmentation.ground import Ground, find_ground
 from pop_core.stopwatch import Stopwatch
 from pop_core.tracking.association import Expected, offset_m
-from pop_core.tracking.finder import Finder, Found
+from pop_core.tracking.background import Background
+from pop_core.tracking.finder import Finder, Found, found_people
 from pop_core.tracking.late_belief import carried
 
 
+@runtime_checkable
+class Watcher(Protocol):
+    """What a look needs of a pipeline: a keypoint source and its settings."""
+
+    @property
+    def detector(self) -> KeypointDetector:
+        """Return the keypoint source."""
+        ...
+
+    @property
+    def config(self) -> PipelineConfig:
+        """Return the settings."""
+        ...
+
+
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class Seen:
     """What was seen in a frame.
 
     Args:
-        frame: The undistorted frame.
         found: The people in it.
         ground: The floor, if one is seen.
         noise: Noise of the measured depth.
         times_ms: Wall time per step [ms].
+    """
+
+    found: Found
+    ground: Ground | None
+    noise: DepthNoise
+    times_ms: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """A frame and what was seen in it.
+
+    Args:
+        frame: The undistorted frame.
+        seen: What was seen.
         places: Where those were who were known in that frame, by the number of their track; of
             none when it is the present one.
     """
 
     frame: RgbdFrame
-    found: Found
-    ground: Ground | None
-    noise: DepthNoise
-    times_ms: Mapping[str, float]
+    seen: Seen
     places: Mapping[int, Expected] = field(default_factory=dict)
+
+    @property
+    def found(self) -> Found:
+        """Return the people who were seen."""
+        return self.seen.found
 
     def scene(self, taken: Bool[np.ndarray, 'h w'], track: int | None = None) -> Scene:
         """Return its frame, with the pixels that nearer people explain.
@@ -62,7 +95,7 @@ class Look:
             taken = np.zeros_like(taken) if place.cover is None else place.cover
         elif self.places:
             taken = np.any([other.mask for other in self.places.values()], axis=0)
-        return Scene(self.frame, self.ground, self.noise, taken)
+        return Scene(self.frame, self.seen.ground, self.seen.noise, taken)
 
     def then(self, track: int, expected: Expected) -> Expected:
         """Return where a person was in this frame, who should be somewhere by now."""
@@ -112,45 +145,38 @@ class Glimpse:
         return carried(lifted, place.points, expected.points, look.frame.camera)
 
 
-def look_for_people(pipeline: BodyPipeline, frame: RgbdFrame, seen: RgbdFrame) -> Look:
+def look_for_people(watcher: Watcher, frame: RgbdFrame, undistorted: RgbdFrame) -> Seen:
     """Return what is seen in a frame.
 
     Args:
-        pipeline: Knows the detector and its settings.
+        watcher: Knows the detector and the settings.
         frame: The frame as the camera gave it.
-        seen: The same without distortion.
+        undistorted: The same without distortion.
 
     Raises:
         PopError: If the keypoint source cannot read what it needs for this frame.
     """
     watch = Stopwatch()
     with watch.step('detect'):
-        detections = pipeline.detector.detect(frame)
+        detections = watcher.detector.detect(frame)
     with watch.step('lift'):
-        found = Finder(pipeline).lift(
-            seen, [undistort_detection(d, frame.camera) for d in detections])
+        found = found_people(
+            undistorted, [undistort_detection(d, frame.camera) for d in detections],
+            watcher.config.lifting)
     with watch.step('ground'):
-        ground = find_ground(seen) if pipeline.config.use_ground else None
-        noise = estimate_depth_noise(seen.depth_m)
-    return Look(seen, found, ground, noise, watch.times_ms)
-
-
-@runtime_checkable
-class Lookout(Protocol):
-    """Whoever looks meanwhile, one look after the other."""
-
-    def submit(self, look: Callable[[], Look]) -> Future[Look]:
-        """Begin a look."""
-        ...
+        ground = find_ground(undistorted) if watcher.config.use_ground else None
+        noise = estimate_depth_noise(undistorted.depth_m)
+    return Seen(found, ground, noise, watch.times_ms)
 
 
 class Looks:
     """Has one look at a time made, and keeps it until the next frame."""
 
-    def __init__(self, lookout: Lookout | None = None) -> None:
+    def __init__(self, lookout: Background | None = None) -> None:
         """Have looks made meanwhile; None makes each while it is waited for."""
         self._lookout = lookout
-        self._made: Future[Look] | None = None
+        self._made: Future[Seen] | None = None
+        self._frame: RgbdFrame | None = None
         self._places: dict[int, Expected] | None = None
 
     @property
@@ -164,28 +190,31 @@ class Looks:
         Raises:
             Exception: Whatever ended it.
         """
-        made = self._made
-        if made is None or not made.done():
+        made, frame, places = self._made, self._frame, self._places
+        if made is None or frame is None or not made.done():
             return None
-        places = self._places or {}
         self.forget()
-        return replace(made.result(), places=places)
+        return Look(frame, made.result(), places or {})
 
-    def look(self, make: Callable[[], Look], *, wait: bool) -> Look | None:
+    def look(
+        self, watcher: Watcher, frame: RgbdFrame, undistorted: RgbdFrame, *, wait: bool
+    ) -> Look | None:
         """Return a look at the present frame, or begin it if nobody has to wait.
 
         Args:
-            make: Makes it.
+            watcher: Looks where nobody does meanwhile.
+            frame: The frame as the camera gave it.
+            undistorted: The same without distortion.
             wait: Whether it is needed at once; one that is being made is forgotten then.
         """
         if self._lookout is None:
-            return make()
+            return Look(undistorted, look_for_people(watcher, frame, undistorted))
         # The detector answers one question at a time.
-        made = self._lookout.submit(make)
+        made = self._lookout.submit(look_for_people, frame, undistorted)
         self.forget()
         if wait:
-            return made.result()
-        self._made = made
+            return Look(undistorted, made.result())
+        self._made, self._frame = made, undistorted
         return None
 
     def remember(self, places: Callable[[], dict[int, Expected]]) -> None:
@@ -195,4 +224,4 @@ class Looks:
 
     def forget(self) -> None:
         """Forget what is being made; it is finished, but nobody will hear of it."""
-        self._made = self._places = None
+        self._made = self._frame = self._places = None

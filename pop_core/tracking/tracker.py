@@ -32,7 +32,7 @@ from pop_core.tracking.finder import Finder
 from pop_core.tracking.follower import Follower
 from pop_core.tracking.fresh_fits import FreshFit, FreshFits
 from pop_core.tracking.late_limbs import LateLimbs
-from pop_core.tracking.looks import Glimpse, Look, Lookout, Looks, look_for_people
+from pop_core.tracking.looks import Glimpse, Look, Looks
 from pop_core.tracking.track import PersonTrack, new_track
 from pop_core.tracking.tracking_config import TrackingConfig
 
@@ -44,7 +44,7 @@ class BodyTracker:
 
     def __init__(
         self, pipeline: BodyPipeline, config: TrackingConfig | None = None,
-        finding: Background | None = None, lookout: Lookout | None = None,
+        finding: Background | None = None, lookout: Background | None = None,
         searching: Background | None = None,
     ) -> None:
         """Prepare to follow people with a pipeline's model, detector and settings.
@@ -105,15 +105,18 @@ class BodyTracker:
         self._late_limbs.begin(frame.stamp_ns, has_time=self._gap.is_of_slow_camera)
         with watch.step('undistort'):
             seen = undistort_frame(frame)
-        is_late = self._fresh.poll()
+        is_late, has_begun = self._fresh.poll(), False
         fresh = self._fresh.take(None)
-        if fresh is not None and self._welcome(fresh) is None:
-            # Who stands too far away, say, is no reason to look again at once.
-            self._refused, is_late = fresh.person.status, False
-        is_late = is_late or (
+        if fresh is not None:
+            has_begun = self._welcome(fresh) is not None
+            if not has_begun:
+                # Who stands too far away, say, is no reason to look again at once.
+                self._refused, is_late = fresh.person.status, False
+        has_begun = has_begun or (
             self._gap.is_long and any(track.has_just_begun for track in self._tracks))
         with self._blas.limit(limits=1, user_api='blas'):
-            look = self._look(frame, seen, watch, is_late=is_late)
+            look = self._look(
+                frame, seen, watch, is_late=is_late or has_begun, has_begun=has_begun)
             bodies, statuses = self._track(seen, look, watch)
             self._looks.remember(self._places)
         bodies = [replace(b, mask=distort_mask(b.mask, frame.camera)) for b in bodies]
@@ -136,20 +139,30 @@ class BodyTracker:
         return frame.stamp_ns < stamp_ns or not camera.sees_like(frame.camera)
 
     def _look(
-        self, frame: RgbdFrame, seen: RgbdFrame, watch: Stopwatch, *, is_late: bool
+        self, frame: RgbdFrame, seen: RgbdFrame, watch: Stopwatch, *, is_late: bool,
+        has_begun: bool,
     ) -> Look | None:
-        """Return the people a detector sees, or None in frames that do without."""
+        """Return the people a detector sees, or None in frames that do without.
+
+        Args:
+            frame: The frame as the camera gave it.
+            seen: The same without distortion.
+            watch: Told how long it took.
+            is_late: Whether a body comes in that was fitted to a frame of some time ago.
+            has_begun: Whether it is somebody's first, who is elsewhere by now.
+        """
         look = self._looks.take()
-        wait = is_late or not self._tracks or self._gap.is_of_slow_camera
+        wait = has_begun or not self._tracks or self._gap.is_of_slow_camera
         if self._schedule.is_due(
                 self._tracks, self._gap, is_busy=self._fresh.is_busy, is_late=is_late,
                 is_looking=self._looks.is_busy and not wait):
-            pipeline = self.pipeline
-            look = self._looks.look(
-                lambda: look_for_people(pipeline, frame, seen), wait=wait) or look
+            look = self._looks.look(self.pipeline, frame, seen, wait=wait) or look
+        if look is None and self._looks.is_busy:
+            # A body found anew is compared by keypoints too.
+            self._fresh.put_off()
         if look is not None:
-            watch.add(look.times_ms)
-            self._ground, self._noise = look.ground, look.noise
+            watch.add(look.seen.times_ms)
+            self._ground, self._noise = look.seen.ground, look.seen.noise
         return look
 
     def _places(self) -> dict[int, Expected]:

@@ -26,7 +26,7 @@ from pop_core.tracking.finder import find_person
 from pop_core.tracking.late_limbs import LimbQuestion, find_limbs
 from pop_core.tracking.tracking_config import TrackingConfig
 from pop_ros import finding_process
-from pop_ros.finding_process import FindingError, FindingProcess
+from pop_ros.finding_process import FITTING_NICENESS, FindingError, FindingProcess
 
 WAIT_S = 120.0
 
@@ -140,10 +140,10 @@ def test_stopping_while_a_dead_process_is_replaced_leaves_none(
 ) -> None:
     replacing, started = threading.Event(), finding_process._started
 
-    def slowly_started() -> subprocess.Popen[bytes]:
+    def slowly_started(niceness: int) -> subprocess.Popen[bytes]:
         replacing.set()
         time.sleep(0.3)
-        return started()
+        return started(niceness)
 
     monkeypatch.setattr(finding_process, '_started', slowly_started)
     waiting = finding.submit(find_person, *seen)
@@ -179,3 +179,18 @@ def test_nothing_is_left_of_a_node_that_was_killed(number: signal.Signals) -> No
         time.sleep(0.1)
     assert not is_running(pid)
     node.wait(30)
+
+
+def test_it_gives_way_to_the_node_though_it_has_a_session_of_its_own(
+    finding: FindingProcess
+) -> None:
+    finding.start()
+    finding.submit(time.sleep).exception(WAIT_S)  # whatever comes of it, the process is there
+    pid = child_of(finding)
+    wanted = min(FITTING_NICENESS + os.nice(0), 19)
+    assert os.getsid(pid) != os.getsid(0)
+    assert os.getpriority(os.PRIO_PROCESS, pid) == wanted
+    autogroup = Path(f'/proc/{pid}/autogroup')
+    if not autogroup.exists():
+        pytest.skip('this Linux has no autogroups')
+    assert autogroup.read_text().split()[-1] == str(wanted)

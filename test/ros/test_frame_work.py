@@ -1,26 +1,25 @@
 """A fault of the node itself is counted, told and survived."""
 
-import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import rclpy
+from builtin_interfaces.msg import Time
 from rclpy.lifecycle import LifecycleNode
 from support.camera_cases import PLAIN, build
+from support.faults import divide_by_zero, take_for_ever
 from support.messages import camera_info, depth_image, image
 from support.player import Listener
 from support.recording import Recording, record
 
 from pop_core.config import PipelineConfig
-from pop_core.errors import PopError
-from pop_core.keypoints.detection import Detection, KeypointDetector
-from pop_core.keypoints.openpose_json import OpenPoseJsonDetector
-from pop_core.rgbd import RgbdFrame
+from pop_core.tracking import looks
+from pop_ros import looking
 from pop_ros.frame_fitter import FrameFitter
 from pop_ros.frame_work import FrameWork
 from pop_ros.inputs import RgbdMessages
+from pop_ros.node_arguments import SourceArguments
 from pop_ros.node_config import NodeConfig
 from pop_ros.node_outputs import NodeOutputs
 from pop_ros.parameters import ConfigParameters
@@ -28,41 +27,15 @@ from pop_ros.static_frames import StaticFrames
 from pop_ros.statistics import NodeStatistics
 
 
-class Faulty:
-    """A keypoint source with a bug in every other frame."""
-
-    def __init__(self) -> None:
-        self.calls = 0
-
-    def detect(self, _frame: RgbdFrame) -> list[Detection]:
-        self.calls += 1
-        if self.calls % 2:
-            raise ZeroDivisionError('division by zero')
-        return []
-
-
-class Stuck(OpenPoseJsonDetector):
-    """A keypoint source that takes its time after some answers, and is then told to go on."""
-
-    def __init__(self, folder: Path, answers: int) -> None:
-        super().__init__(folder)
-        self.left, self.go_on = answers, threading.Event()
-
-    def detect(self, frame: RgbdFrame) -> list[Detection]:
-        self.left -= 1
-        if self.left < 0:
-            self.go_on.wait(60.0)
-        return super().detect(frame)
-
-
 def prepared(
-    node: LifecycleNode, detector: KeypointDetector
+    node: LifecycleNode, keypoints: Path
 ) -> tuple[FrameWork, NodeStatistics]:
     """Return the work of a node that always works, and what it counts."""
     statistics = NodeStatistics()
     settings = ConfigParameters(node, NodeConfig(lazy=False), PipelineConfig(), lambda: None)
     work = FrameWork(
-        node, settings, detector, StaticFrames(), NodeOutputs(node), statistics)
+        node, settings, SourceArguments('json', keypoints), StaticFrames(), NodeOutputs(node),
+        statistics)
     return work, statistics
 
 
@@ -84,18 +57,22 @@ def node() -> Iterator[LifecycleNode]:
 
 
 def test_frames_after_a_fault_are_fitted_and_the_fault_is_counted(
-    node: LifecycleNode, capfd: pytest.CaptureFixture[str], tmp_path: Path
+    node: LifecycleNode, capfd: pytest.CaptureFixture[str], tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    detector = Faulty()
-    work, statistics = prepared(node, detector)
+    (tmp_path / '0.json').write_text('{"people": []}')
+    work, statistics = prepared(node, tmp_path)
     color, depth, info = build(next(iter(PLAIN)), 0)
+    color.header.stamp = depth.header.stamp = info.header.stamp = Time()
+    sees = looks.look_for_people
     with Listener() as clock:
         assert clock.spin_until(lambda: work.is_ready, 120)
         work.run(True)
         for count in range(1, 7):
+            monkeypatch.setattr(looks, 'look_for_people', divide_by_zero if count % 2 else sees)
             work.put(RgbdMessages(color, depth, info, 0.0))
             assert clock.spin_until(lambda: statistics.snapshot().pending == 0, 10)
-            assert detector.calls == count
+        monkeypatch.setattr(looking, '_detect', divide_by_zero)
         answer = work.snapshot(tmp_path)
         assert clock.spin_until(answer.done, 10)
         assert answer.result() == (False, 'division by zero')
@@ -117,7 +94,7 @@ def test_frames_that_nobody_had_time_for_do_not_make_a_camera_slow(
         FrameFitter, 'fit',
         lambda *args, skipped, **named: told.append(skipped) or fit(
             *args, skipped=skipped, **named))
-    work, statistics = prepared(node, OpenPoseJsonDetector(recording.keypoints))
+    work, statistics = prepared(node, recording.keypoints)
     with Listener() as clock:
         assert clock.spin_until(lambda: work.is_ready, 120)
         work.run(True)
@@ -131,44 +108,34 @@ def test_frames_that_nobody_had_time_for_do_not_make_a_camera_slow(
 
 
 def test_people_are_followed_while_the_keypoint_source_thinks(
-    node: LifecycleNode, tmp_path: Path
+    node: LifecycleNode, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recording = record(tmp_path, n_frames=12, rate_hz=15.0)
-    detector = Stuck(recording.keypoints, answers=2)
-    work, statistics = prepared(node, detector)
+    work, statistics = prepared(node, recording.keypoints)
     with Listener() as clock:
         assert clock.spin_until(lambda: work.is_ready, 120)
         work.run(True)
         for number in range(1, 13):
+            if number == 3:
+                monkeypatch.setattr(looks, 'look_for_people', take_for_ever)
             work.put(messages(recording, number))
             assert clock.spin_until(lambda: statistics.snapshot().pending == 0, 20)
-        assert detector.left < 0  # it was asked, and has not answered
         assert statistics.snapshot().frames == 12
-        assert work.looking_s > 0.0
-        detector.go_on.set()
-        assert work.stop(20)
+        assert work.looking_s > 0.0  # it was asked, and has not answered
+    assert work.stop(20)
     assert statistics.snapshot().refused == 0
 
 
-def test_at_the_end_frame_and_look_share_one_patience(
-    node: LifecycleNode, monkeypatch: pytest.MonkeyPatch
+def test_a_frame_that_waits_for_a_stuck_source_is_given_up_at_the_end(
+    node: LifecycleNode, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    go_on, asked = threading.Event(), threading.Event()
-
-    def slow(fitter: FrameFitter, *_: object, **__: object) -> None:
-        fitter._looking.submit(go_on.wait)
-        asked.set()
-        time.sleep(0.7)
-        raise PopError('in vain')
-
-    monkeypatch.setattr(FrameFitter, 'fit', slow)
-    work, _ = prepared(node, Faulty())
+    recording = record(tmp_path, n_frames=1, rate_hz=15.0)
+    monkeypatch.setattr(looks, 'look_for_people', take_for_ever)
+    work, statistics = prepared(node, recording.keypoints)
     with Listener() as clock:
         assert clock.spin_until(lambda: work.is_ready, 120)
         work.run(True)
-        work.put(RgbdMessages(*build(next(iter(PLAIN)), 0), 0.0))
-        assert asked.wait(20)
-    began_s = time.monotonic()
-    assert not work.stop(1.0)
-    assert time.monotonic() - began_s < 1.4  # and not 0.7 s and another second
-    go_on.set()
+        work.put(messages(recording, 1))
+        assert clock.spin_until(lambda: work.looking_s > 0.0, 20)
+    assert work.stop(0.1)
+    assert statistics.snapshot().drops == {'finding': 1}

@@ -13,7 +13,6 @@ from pop_core.pipeline import BodyPipeline
 from pop_core.retrieval.default_library import default_library
 from pop_core.rgbd import RgbdFrame
 from pop_core.tracking.background import Background
-from pop_core.tracking.looks import Lookout
 from pop_core.tracking.tracker import BodyTracker
 from pop_core.tracking.tracking_config import TrackingConfig
 
@@ -43,7 +42,7 @@ class Stage:
 
     def __init__(
         self, body: BodyModel, config: TrackingConfig | None = None,
-        finding: Background | None = None, lookout: Lookout | None = None,
+        finding: Background | None = None, lookout: Background | None = None,
         searching: Background | None = None,
     ) -> None:
         self.body, self.source = body, Scripted(body)

@@ -14,12 +14,13 @@ from pop_core.body.model import BodyModel, BodyParameters, shared_points
 from pop_core.depth_noise import USUAL_NOISE
 from pop_core.errors import PopError
 from pop_core.geometry.camera import Camera
+from pop_core.keypoints.lifting import LiftingConfig
 from pop_core.rgbd import RgbdFrame
 from pop_core.tracking.association import Expected
 from pop_core.tracking.detection_schedule import DetectionSchedule, Gap
-from pop_core.tracking.finder import Finder, Found
+from pop_core.tracking.finder import Finder, found_people
 from pop_core.tracking.late_belief import carried
-from pop_core.tracking.looks import Glimpse, Look, Looks
+from pop_core.tracking.looks import Glimpse, Look, Looks, Seen, Watcher
 from pop_core.tracking.tracking_config import TrackingConfig
 
 STEP_M = 0.03  # a slow walk at the stage's rate
@@ -31,14 +32,15 @@ class Slow:
     """Sees at once what there is to see, and tells of it when it is told to."""
 
     def __init__(self) -> None:
-        self.waiting: list[tuple[Future, Look]] = []
+        self.waiting: list[tuple[Future, Seen]] = []
         self.looks = 0
         self.is_at_once = False
+        self.watcher: Watcher | None = None
 
-    def submit(self, look: Callable[[], Look]) -> Future:
+    def submit(self, work: Callable[..., Seen], *frames: RgbdFrame) -> Future:
         self.looks += 1
         future: Future = Future()
-        self.waiting.append((future, look()))
+        self.waiting.append((future, work(self.watcher, *frames)))
         if self.is_at_once:
             self.finish()
         return future
@@ -55,11 +57,18 @@ def slow() -> Slow:
     return Slow()
 
 
+def watched(body: BodyModel, slow: Slow) -> Stage:
+    """Return a stage that somebody slow looks at."""
+    made = Stage(body, OFTEN, lookout=slow)
+    slow.watcher = made.tracker.pipeline
+    return made
+
+
 @pytest.fixture
 def stage(body: BodyModel, slow: Slow, person: BodyParameters) -> Stage:
     """Somebody who is followed well; from now on looks take their time."""
     slow.is_at_once = True
-    made = Stage(body, OFTEN, lookout=slow)
+    made = watched(body, slow)
     made.show(person, times=5)
     slow.is_at_once = False
     return made
@@ -139,31 +148,35 @@ def test_who_is_followed_by_nobody_is_looked_for_at_once(
     body: BodyModel, slow: Slow, person: BodyParameters
 ) -> None:
     slow.is_at_once = True
-    alone = Stage(body, OFTEN, lookout=slow)
+    alone = watched(body, slow)
     assert only(alone.show(person)).track.id == 0
 
 
-def a_look() -> Look:
-    frame = RgbdFrame(
+def a_frame() -> RgbdFrame:
+    return RgbdFrame(
         np.zeros((2, 2, 3), np.uint8), np.ones((2, 2), np.float32),
         Camera(2, 2, 2.0, 2.0, 0.5, 0.5), 0)
-    return Look(frame, Found(), None, USUAL_NOISE, {})
 
 
-def test_a_look_that_is_needed_at_once_is_taken_before_an_old_one(slow: Slow) -> None:
-    looks = Looks(slow)
-    old, new = a_look(), a_look()
-    assert looks.look(lambda: old, wait=False) is None
+def test_a_look_that_is_needed_at_once_is_taken_before_an_old_one(
+    stage: Stage, slow: Slow, person: BodyParameters
+) -> None:
+    looks, old, new = Looks(slow), a_frame(), a_frame()
+    assert looks.look(stage.tracker.pipeline, old, old, wait=False) is None
     assert looks.is_busy
     slow.is_at_once = True
-    assert looks.look(lambda: new, wait=True) is new
+    look = looks.look(stage.tracker.pipeline, new, new, wait=True)
+    assert look is not None
+    assert look.frame is new
     assert not looks.is_busy
     assert looks.take() is None
 
 
-def test_without_help_every_look_is_waited_for() -> None:
-    looks, made = Looks(), a_look()
-    assert looks.look(lambda: made, wait=False) is made
+def test_without_help_every_look_is_waited_for(stage: Stage) -> None:
+    looks, frame = Looks(), a_frame()
+    look = looks.look(stage.tracker.pipeline, frame, frame, wait=False)
+    assert look is not None
+    assert look.frame is frame
     assert not looks.is_busy
 
 
@@ -186,10 +199,10 @@ def test_of_who_stood_behind_others_nothing_is_lifted_onto_where_they_were_then(
     front = own & (frame.depth_m < person.transl[2] - 0.5)
     detection = stage.source.detection(frame, person)
     finder = Finder(stage.tracker.pipeline)
-    found = finder.lift(frame, [detection])
+    found = found_people(frame, [detection], LiftingConfig())
     points = attached_positions(shared_points(body), body, person)
     behind = Expected(points, 0.01, ~front, front)
-    old = replace(a_look(), frame=frame, found=found, places={
+    old = Look(frame, Seen(found, None, USUAL_NOISE, {}), {
         0: Expected(points - [0.0, 0.0, 0.8], 0.01, front), 1: behind})
     gone_on = np.roll(front, 40, axis=1)
 
