@@ -29,30 +29,63 @@ def bone_samples(depth, u0, v0, u1, v1, aside_px, out):
             out[i, k] = depth[y, x] if inside else np.nan
 
 
-@njit(cache=True, nogil=True)
-def bone_cost(samples, from_m, to_m, from_skin_m, to_skin_m, costs):
-    """Return the cost of what was measured along a bone between two depths.
+# Innermost loops go over depths without branches or checks: processors do several at once.
+@njit(cache=True, nogil=True, error_model='numpy')
+def add_bone_costs(samples, from_m, to_m, from_skin_m, to_skin_m, costs, out):
+    """Add to out (m) the cost of what was measured along a bone, for m depths of its end.
 
     `costs` are those of a bone in empty space, behind another surface and where nothing was
     measured, then the slack and the softness of the skin's place [m].
     """
     empty, behind, unknown, slack, soft = costs
     n = len(samples)
-    total = 0.0
+    empty, behind, unknown = empty / n, behind / n, unknown / n
+    per_empty, per_behind = empty / soft, behind / soft
     for i in range(n):
         share = (i + 1.0) / (n + 1.0)
-        # Inverse depth is linear along a line in the image.
-        z = from_m * to_m / ((1.0 - share) * to_m + share * from_m)
-        skin = z - (1.0 - share) * from_skin_m - share * to_skin_m
-        lowest = np.inf
-        for k in range(3):
-            gap = samples[i, k] - skin
-            if np.isnan(gap):
-                continue
-            over = min(max(abs(gap) - slack, 0.0) / soft, 1.0)
-            lowest = min(lowest, over * (empty if gap > 0 else behind))
-        total += lowest if lowest < np.inf else unknown
-    return total / n
+        keep, part = 1.0 - share, share * from_m
+        cover = keep * from_skin_m + share * to_skin_m
+        # Where a bone's surface would have to be for these to be its skin.
+        near, left, right = samples[i, 0] + cover, samples[i, 1] + cover, samples[i, 2] + cover
+        if np.isnan(near):
+            near = right if np.isnan(left) else left
+        if np.isnan(near):
+            out += unknown
+            continue
+        left = near if np.isnan(left) else left
+        right = near if np.isnan(right) else right
+        for a in range(len(to_m)):
+            # Inverse depth is linear along a line in the image.
+            z = from_m * to_m[a] / (keep * to_m[a] + part)
+            cost = _ramp(near - z, slack, empty, per_empty, behind, per_behind)
+            other = _ramp(left - z, slack, empty, per_empty, behind, per_behind)
+            cost = cost if cost < other else other
+            other = _ramp(right - z, slack, empty, per_empty, behind, per_behind)
+            cost = cost if cost < other else other
+            out[a] += cost
+
+
+@njit(cache=True, nogil=True, inline='always')
+def _ramp(gap, slack, empty, per_empty, behind, per_behind):
+    """Return what a surface this far behind a bone's skin [m] costs; in front if negative."""
+    cost = (gap - slack) * per_empty if gap > 0.0 else (-gap - slack) * per_behind
+    most = empty if gap > 0.0 else behind
+    cost = cost if cost < most else most
+    return cost if cost > 0.0 else 0.0
+
+
+@njit(cache=True, nogil=True, error_model='numpy')
+def length_costs(from_m, to_m, from_ray, to_ray, limits, tolerance, out):
+    """Fill out (m) with the cost of the length and lean of a bone, for m depths of its end."""
+    shortest, longest, lean = limits
+    x, y = from_ray[0] * from_m, from_ray[1] * from_m
+    for a in range(len(to_m)):
+        dz = to_m[a] - from_m
+        dx, dy = to_ray[0] * to_m[a] - x, to_ray[1] * to_m[a] - y
+        length = np.sqrt(dx * dx + dy * dy + dz * dz)
+        excess = length - longest if length - longest > shortest - length else shortest - length
+        excess = (excess if excess > 0.0 else 0.0) / tolerance
+        out[a] = 0.5 * excess * excess + 0.5 * (dz / lean) * (dz / lean)
 
 
 @njit(cache=True, nogil=True)
@@ -62,7 +95,7 @@ def tree_depths(
     """Fill out (n) with the bin of each joint that minimises unary and bone costs on the tree.
 
     A link costs 0.5 (x / tolerance)^2 when it is too long or too short by x, 0.5 (dz / lean)^2
-    for the depth dz along it, and what `bone_cost` says; `worst` at most. Exact by dynamic
+    for the depth dz along it, and what `add_bone_costs` says; `worst` at most. Exact by dynamic
     programming, leaves first.
 
     Args:
@@ -77,38 +110,33 @@ def tree_depths(
         worst: Most that a broken bone costs.
         samples: Depth along each link [m] (n, p, 3).
         skin_m: Distance of each joint from the skin before it [m].
-        costs: Of `bone_cost`, for each link (n, 5).
+        costs: Of `add_bone_costs`, for each link (n, 5).
         out: Chosen bins, filled for the joints in `order`.
     """
     n, m = unary.shape
     step = bins[1] - bins[0]
     cost = unary.copy()
     best = np.zeros((n, m), dtype=np.int64)
+    link = np.empty(m)
     for at in range(len(order) - 1, 0, -1):
         j = order[at]
         parent = links[j]
-        shortest, longest, lean = limits[j]
         lowest = int(np.argmin(cost[j]))
         fallback = cost[j, lowest] + worst
         seen = costs[j, :3].max() > 0.0
-        band = int(np.ceil((longest + EXCUSED * tolerance) / step))
+        band = int(np.ceil((limits[j, 1] + EXCUSED * tolerance) / step))
         for b in range(m):
+            first, last = max(0, b - band), min(m, b + band + 1)
+            near, there = bins[first:last], link[first:last]
+            length_costs(bins[b], near, rays[parent], rays[j], limits[j], tolerance, there)
+            if seen:
+                add_bone_costs(
+                    samples[j], bins[b], near, skin_m[parent], skin_m[j], costs[j], there)
             smallest, chosen = fallback, lowest
-            for a in range(max(0, b - band), min(m, b + band + 1)):
-                if cost[j, a] >= smallest:
-                    continue
-                dz = bins[a] - bins[b]
-                dx = rays[j, 0] * bins[a] - rays[parent, 0] * bins[b]
-                dy = rays[j, 1] * bins[a] - rays[parent, 1] * bins[b]
-                length = np.sqrt(dx * dx + dy * dy + dz * dz)
-                excess = max(0.0, length - longest, shortest - length) / tolerance
-                slope = dz / lean
-                link = 0.5 * excess * excess + 0.5 * slope * slope
-                if seen and cost[j, a] + link < smallest and link < worst:
-                    link += bone_cost(
-                        samples[j], bins[b], bins[a], skin_m[parent], skin_m[j], costs[j])
-                if cost[j, a] + min(link, worst) < smallest:
-                    smallest, chosen = cost[j, a] + min(link, worst), a
+            for a in range(first, last):
+                total = cost[j, a] + min(link[a], worst)
+                if total < smallest:
+                    smallest, chosen = total, a
             best[j, b] = chosen
             cost[parent, b] += smallest
     root = order[0]

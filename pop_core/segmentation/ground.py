@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Float32
 
 from pop_core.geometry.camera import Camera
 from pop_core.rgbd import RgbdFrame
+from pop_core.segmentation.plane_kernels import plane_shares
 
 GRID_PX = 80  # longest side of the thinned image: a floor is large
 TILT_COS = 0.6  # cameras look down or up by at most 53 degrees
@@ -20,6 +21,7 @@ ALIKE_COS = 0.85
 NARROWINGS = (1.0, 0.6, 0.4)  # of the inlier band, refinement by refinement
 MIN_SHARE = 0.02  # of all measured points
 MAX_BELOW = 0.005  # share of points that may lie below a floor: mirrors, noise
+BELOW_WIDTHS = 3.0  # surely below: this many widths of the plane
 LOOSE_BELOW = 0.02  # the same for a proposal, whose normal is one noisy pixel's
 
 
@@ -74,26 +76,22 @@ def find_ground(frame: RgbdFrame, tries: int = 60) -> Ground | None:
         return None
     proposals = upward[:: max(1, len(upward) // tries)]
     normal, on_plane = normals[proposals], points[proposals]
-    height = normal @ points.T - np.einsum('pc,pc->p', normal, on_plane)[:, None]
     # Depth noise grows with distance, and so does the width of a plane.
     width = INLIER_M + 0.004 * points[:, 2] ** 2
-    support = _shares(np.abs(height) < width)
-    support[_shares(height < -3 * width) > LOOSE_BELOW] = 0.0
+    support, below = np.zeros((2, len(proposals)))
+    plane_shares(
+        np.ascontiguousarray(points.T), width, normal, on_plane, BELOW_WIDTHS, support, below)
+    support[below > LOOSE_BELOW] = 0.0
     while support.max() >= MIN_SHARE:
         best = int(np.argmax(support))
         ground = _settled(normal[best], on_plane[best], points, normals, width)
-        below = np.mean(ground.height(points) < -width)
-        if below <= MAX_BELOW and _upward(ground.normal):
+        share_below = np.mean(ground.height(points) < -width)
+        if share_below <= MAX_BELOW and _upward(ground.normal):
             return ground
         # A seat or a table with floor beside it: none of its points proposes a better plane.
         support[np.abs(ground.height(on_plane)) < width[proposals]] = 0.0
         support[best] = 0.0
     return None
-
-
-def _shares(mask: Bool[np.ndarray, 'p n']) -> Float[np.ndarray, 'p']:
-    """Return the share of each row that is true; counting is faster than a mean."""
-    return np.array([np.count_nonzero(row) for row in mask]) / mask.shape[1]
 
 
 def _upward(normal: Float[np.ndarray, '*n 3']) -> Bool[np.ndarray, '*n']:

@@ -19,7 +19,15 @@ COSTS = BONE_COSTS[ELBOW]
 
 
 def bone_cost(samples, near_m, far_m, skin_m=0.0):
-    return kernels.bone_cost(samples, near_m, far_m, skin_m, skin_m, COSTS)
+    return cost_along(samples, near_m, far_m, skin_m, skin_m, COSTS)
+
+
+def cost_along(samples, near_m, far_m, near_skin_m, far_skin_m, costs):
+    """The cost of what was measured along one bone, by the kernel."""
+    out = np.zeros(1)
+    kernels.add_bone_costs(
+        samples, near_m, np.array([far_m]), near_skin_m, far_skin_m, costs, out)
+    return out[0]
 
 
 def whole_cost(choice, unary, bins, rays, links, limits, samples, skin_m, costs):
@@ -35,7 +43,7 @@ def whole_cost(choice, unary, bins, rays, links, limits, samples, skin_m, costs)
         shortest, longest, lean = limits[j]
         excess = max(0.0, length - longest, shortest - length) / TOLERANCE
         link = 0.5 * excess**2 + 0.5 * ((far - near) / lean) ** 2
-        link += kernels.bone_cost(samples[j], near, far, skin_m[parent], skin_m[j], costs[j])
+        link += cost_along(samples[j], near, far, skin_m[parent], skin_m[j], costs[j])
         total += min(WORST, link)
     return total
 
@@ -62,6 +70,26 @@ def test_joint_depths_are_those_of_the_lowest_energy_of_all(seed):
 def energy(choice, terms):
     unary, bins, rays, links, limits, samples, skin_m, costs = terms
     return whole_cost(choice, unary, bins, rays, links, limits, samples, skin_m, costs)
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_the_cost_along_a_bone_is_that_of_the_nearest_of_what_was_measured(seed):
+    rng = np.random.default_rng(seed)
+    samples = rng.uniform(1.4, 2.6, (6, 3))
+    samples[rng.random((6, 3)) < 0.4] = np.nan
+    near_m, far_m = 1.9, np.linspace(1.5, 2.5, 13)
+    out = np.full(len(far_m), 7.0)
+    kernels.add_bone_costs(samples, near_m, far_m, 0.03, 0.07, COSTS, out)
+    empty, behind, unknown, slack, soft = COSTS
+    for end_m, cost in zip(far_m, out, strict=True):
+        each = []
+        for k, row in enumerate(samples):
+            share = (k + 1) / 7
+            skin_m = 1 / ((1 - share) / near_m + share / end_m) - (1 - share) * 0.03 - share * 0.07
+            gap = row[np.isfinite(row)] - skin_m
+            over = np.clip((np.abs(gap) - slack) / soft, 0, 1) * np.where(gap > 0, empty, behind)
+            each.append(over.min() if len(over) else unknown)
+        assert cost - 7.0 == pytest.approx(np.mean(each), abs=1e-12)
 
 
 def test_a_bone_whose_skin_was_measured_costs_nothing():

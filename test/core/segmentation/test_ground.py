@@ -5,6 +5,7 @@ from pop_core.geometry.camera import Camera
 from pop_core.geometry.rotation import from_rotvec
 from pop_core.rgbd import RgbdFrame
 from pop_core.segmentation.ground import Ground, find_ground
+from pop_core.segmentation.plane_kernels import plane_shares
 
 CAMERA = Camera(320, 240, 262.0, 262.0, 159.5, 119.5)
 
@@ -80,3 +81,18 @@ def test_pure_noise_has_no_floor_and_breaks_nothing() -> None:
         depth = rng.uniform(0.5, 6.0, (240, 320)).astype(np.float32)
         found = find_ground(frame(depth))
         assert found is None or np.isfinite(found.normal).all()
+
+
+def test_points_on_and_below_many_planes_are_counted_as_one_by_one() -> None:
+    rng = np.random.default_rng(0)
+    points, on_plane = rng.normal(size=(400, 3)), rng.normal(size=(7, 3))
+    normals = rng.normal(size=(7, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    width = rng.uniform(0.05, 0.5, 400)
+    on, below = np.zeros((2, 7))
+    plane_shares(np.ascontiguousarray(points.T), width, normals, on_plane, 2.0, on, below)
+    height = np.einsum('pc,pnc->pn', normals, points - on_plane[:, None])
+    np.testing.assert_allclose(on, (np.abs(height) < width).mean(axis=1))
+    np.testing.assert_allclose(below, (height < -2.0 * width).mean(axis=1))
+    assert on.min() > 0.0
+    assert below.min() > 0.0
