@@ -23,13 +23,14 @@ def _seen(vertices, fx, fy, cx, cy):
     return u, v, inverse
 
 
-@njit(cache=True, nogil=True)
-def _draw(t, a, b, c, u, v, inverse, closed, depth, face_id):
-    """Draw triangle t of vertices a, b, c; see `rasterize`."""
-    h, w = depth.shape
+@njit(cache=True, nogil=True, inline='always')  # a call with six arrays costs as much as it draws
+def _draw(t, a, b, c, u, v, inverse, closed, nearest, face_id):
+    """Draw triangle t of vertices a, b, c into inverse depth, 0 = nothing; see `rasterize`."""
+    h, w = nearest.shape
     if inverse[a] == 0.0 or inverse[b] == 0.0 or inverse[c] == 0.0:
         return
-    area = (u[b] - u[a]) * (v[c] - v[a]) - (u[c] - u[a]) * (v[b] - v[a])
+    ab_u, ab_v, ac_u, ac_v = u[b] - u[a], v[b] - v[a], u[c] - u[a], v[c] - v[a]
+    area = ab_u * ac_v - ac_u * ab_v
     # v points down: what turns to the right in the image, faces away.
     if area == 0.0 or (closed and area > 0.0):
         return
@@ -37,27 +38,39 @@ def _draw(t, a, b, c, u, v, inverse, closed, depth, face_id):
     right = min(w - 1, int(np.floor(max(u[a], u[b], u[c]))))
     top = max(0, int(np.ceil(min(v[a], v[b], v[c]))))
     bottom = min(h - 1, int(np.floor(max(v[a], v[b], v[c]))))
+    if left > right or top > bottom:
+        return
     # Barycentric weights and inverse depth change by constants from pixel to pixel.
     share = 1.0 / area
-    b_across, b_down = (v[c] - v[a]) * share, -(u[c] - u[a]) * share
-    c_across, c_down = -(v[b] - v[a]) * share, (u[b] - u[a]) * share
+    b_across, b_down, c_across, c_down = ac_v * share, -ac_u * share, -ab_v * share, ab_u * share
     to_b, to_c = inverse[b] - inverse[a], inverse[c] - inverse[a]
+    across = b_across * to_b + c_across * to_c
     for y in range(top, bottom + 1):
-        b_row, c_row = b_down * (y - v[a]), c_down * (y - v[a])
+        right_of_a, below_a = left - u[a], y - v[a]
+        b_left = b_down * below_a + b_across * right_of_a
+        c_left = c_down * below_a + c_across * right_of_a
+        at_left = inverse[a] + b_left * to_b + c_left * to_c
         for x in range(left, right + 1):
-            wb = b_row + b_across * (x - u[a])
-            wc = c_row + c_across * (x - u[a])
+            wb, wc = b_left + b_across * (x - left), c_left + c_across * (x - left)
             if wb < 0.0 or wc < 0.0 or wb + wc > 1.0:
                 continue
-            z = 1.0 / (inverse[a] + wb * to_b + wc * to_c)
-            if z < depth[y, x]:
-                depth[y, x] = z
+            near = np.float32(at_left + across * (x - left))
+            if near > nearest[y, x]:
+                nearest[y, x] = near
                 face_id[y, x] = t
+
+
+@njit(cache=True, nogil=True, error_model='numpy')
+def _invert(image):
+    """Turn inverse depth (h,w) into depth: what is 0 becomes +inf."""
+    for y in range(image.shape[0]):
+        for x in range(image.shape[1]):
+            image[y, x] = np.float32(1.0) / image[y, x]
 
 
 @njit(cache=True, nogil=True)
 def rasterize(vertices, faces, fx, fy, cx, cy, closed, depth, face_id):
-    """Draw triangles of the camera frame [m] into depth (h,w, +inf = nothing) and face ids.
+    """Draw triangles of the camera frame [m] into depth (h,w, zeros; +inf = nothing), face ids.
 
     Pixel centres are integers. 1/z is linear over the image of a triangle, so depth is exact.
     Triangles that touch the near plane are left out, and those of a closed surface that face away.
@@ -65,16 +78,19 @@ def rasterize(vertices, faces, fx, fy, cx, cy, closed, depth, face_id):
     u, v, inverse = _seen(vertices, fx, fy, cx, cy)
     for t in range(faces.shape[0]):
         _draw(t, faces[t, 0], faces[t, 1], faces[t, 2], u, v, inverse, closed, depth, face_id)
+    _invert(depth)
 
 
 @njit(cache=True, nogil=True)
 def rasterize_parts(vertices, faces, part, fx, fy, cx, cy, closed, depth):
-    """Draw each part of a mesh into a depth image of its own (p,h,w, +inf = nothing)."""
+    """Draw each part of a mesh into a depth image of its own (p,h,w, zeros; +inf = nothing)."""
     u, v, inverse = _seen(vertices, fx, fy, cx, cy)
     face_id = np.empty(depth.shape[1:], dtype=np.int32)
     for t in range(faces.shape[0]):
         _draw(t, faces[t, 0], faces[t, 1], faces[t, 2], u, v, inverse, closed, depth[part[t]],
               face_id)
+    for k in range(depth.shape[0]):
+        _invert(depth[k])
 
 
 @njit(cache=True, nogil=True)

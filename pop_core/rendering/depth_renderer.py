@@ -44,7 +44,7 @@ def render_depth(
         closed: Whether `is_closed` holds: then the faces that look away are hidden by others, and
             half of the work is left out.
     """
-    depth_m = np.full((camera.height, camera.width), np.inf, dtype=np.float32)
+    depth_m = np.zeros((camera.height, camera.width), dtype=np.float32)
     face = np.full((camera.height, camera.width), -1, dtype=np.int32)
     depth_kernels.rasterize(
         np.ascontiguousarray(vertices_camera, dtype=np.float64),
@@ -69,7 +69,7 @@ def render_parts(
         closed: Whether the whole mesh is: then faces that look away are left out, and a part has
             no inside where it was cut from the others.
     """
-    depth_m = np.full((count, camera.height, camera.width), np.inf, dtype=np.float32)
+    depth_m = np.zeros((count, camera.height, camera.width), dtype=np.float32)
     depth_kernels.rasterize_parts(
         np.ascontiguousarray(vertices_camera, dtype=np.float64),
         np.ascontiguousarray(f, dtype=np.int64), np.ascontiguousarray(part, dtype=np.int64),
