@@ -52,11 +52,19 @@ class FitBody:
         self.main_bone: Int[np.ndarray, 'n'] = self.skinning.bone_ids[:, 0]
         self.cloth_m = np.where(
             np.isin(self.main_bone, BARE), HAIR_M * hair_share(model)[chosen], CLOTH_M)
+        self._faces_without: dict[tuple[int, ...], Int[np.ndarray, 'k 3']] = {}
         self.soles = (self._sole('left'), self._sole('right'))
 
     def state(self, parameters: BodyParameters) -> BodyState:
         """Return the state of a set of parameters."""
         return BodyState(self, parameters)
+
+    def faces_without(self, joints: tuple[int, ...]) -> Int[np.ndarray, 'k 3']:
+        """Return the triangles that touch no vertex which moves mostly with one of the joints."""
+        if joints not in self._faces_without:
+            touching = np.isin(self.main_bone, joints)[self.faces].any(axis=1)
+            self._faces_without[joints] = self.faces[~touching]
+        return self._faces_without[joints]
 
     def _sole(self, side: str) -> Int[np.ndarray, 'n']:
         """Return the vertices under one foot."""

@@ -1,4 +1,4 @@
-"""Numba kernel that compares bones of many limbs with the depth image."""
+"""Numba kernels of many ways of one limb: where its bones are, and what the depth image says."""
 
 from __future__ import annotations
 
@@ -48,3 +48,38 @@ def bone_misfits(
             per_metre = fx / max(z, NEAREST_M)
             cost[i] += length[k] * width[k] * per_metre * per_metre * (wrong - right)
     return cost
+
+
+@njit(cache=True, nogil=True)
+def chain_points(turns, above, start, bones, bone, share):
+    """Return (points, ends) of limbs: (n,p,3) along their bones, (n,2,3) second and third joint.
+
+    Args:
+        turns: (n,3,3,3) rotations of the three joints, each in the frame of the one before.
+        above: (3,3) rotation of what carries the first joint.
+        start: (3) the first joint, camera frame [m].
+        bones: (3,3) at rest [m].
+        bone: (p) bone of each point.
+        share: (p) how far along it the point lies, 0..1.
+    """
+    points = np.empty((turns.shape[0], bone.shape[0], 3))
+    ends = np.empty((turns.shape[0], 2, 3))
+    frame, turned, joint = np.empty((3, 3)), np.empty((3, 3)), np.empty((4, 3))
+    joint[0] = start
+    for i in range(turns.shape[0]):
+        frame[:] = above
+        for k in range(3):
+            for r in range(3):
+                joint[k + 1, r] = joint[k, r]
+                for c in range(3):
+                    turned[r, c] = (
+                        frame[r, 0] * turns[i, k, 0, c] + frame[r, 1] * turns[i, k, 1, c]
+                        + frame[r, 2] * turns[i, k, 2, c])
+                    joint[k + 1, r] += turned[r, c] * bones[k, c]
+            frame[:] = turned
+        ends[i, 0], ends[i, 1] = joint[1], joint[2]
+        for p in range(bone.shape[0]):
+            k = bone[p]
+            for c in range(3):
+                points[i, p, c] = joint[k, c] + share[p] * (joint[k + 1, c] - joint[k, c])
+    return points, ends

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from pop_core.body.joints import JOINT_INDEX, PARENTS, SHARED_INDEX
 from pop_core.fitting.body_state import BodyState
-from pop_core.geometry.rotation import from_rotvec
+from pop_core.fitting.limb_kernels import chain_points
 
 HAND = 1.6  # hands and feet end this far beyond their joints' rest distance
 
@@ -72,25 +72,18 @@ class LimbPoints:
 
 
 def limb_points(
-    state: BodyState, kind: LimbKind, limbs: Float[np.ndarray, 'n 3 3']
+    state: BodyState, kind: LimbKind, turns: Float[np.ndarray, 'n 3 3 3']
 ) -> LimbPoints:
-    """Return where a body would have a limb, for many rotations of it [rad]."""
+    """Return where a body would have a limb, for many rotations of its three joints."""
     skeleton, scale = state.skeleton, state.parameters.scale
-    R = from_rotvec(limbs.reshape(-1, 3)).reshape(len(limbs), 3, 3, 3)
-    turned = np.broadcast_to(skeleton.G[PARENTS[kind.joints[0]]], R[:, 0].shape)
-    start = np.broadcast_to(state.joints[kind.joints[0]], (len(limbs), 3))
-    points, ends, widths, lengths = [], [], [], []
-    for k, (shares, radius_m) in enumerate(zip(kind.shares, kind.radii_m, strict=True)):
-        here, there = kind.joints[k: k + 2]
-        bone = scale * (skeleton.rest_joints[there] - skeleton.rest_joints[here])
-        bone = bone * (HAND if k == 2 else 1.0)
-        turned = turned @ R[:, k]
-        end = start + turned @ bone
-        points += [start + share * (end - start) for share in shares]
-        widths += [2.0 * scale * radius_m] * len(shares)
-        lengths += [float(np.linalg.norm(bone)) / len(shares)] * len(shares)
-        ends.append(end)
-        start = end
+    here, there = list(kind.joints[:-1]), list(kind.joints[1:])
+    bones = scale * (skeleton.rest_joints[there] - skeleton.rest_joints[here])
+    bones[2] *= HAND
+    per_bone = [len(shares) for shares in kind.shares]
+    bone = np.repeat(np.arange(len(bones)), per_bone)
+    points, ends = chain_points(
+        turns, skeleton.G[PARENTS[kind.joints[0]]], state.joints[kind.joints[0]], bones, bone,
+        np.concatenate(kind.shares))
+    length_m = np.linalg.norm(bones, axis=1) / per_bone
     return LimbPoints(
-        np.stack(points, axis=1), np.stack(ends[:2], axis=1), np.array(widths),
-        np.array(lengths))
+        points, ends, 2.0 * scale * np.array(kind.radii_m)[bone], length_m[bone])

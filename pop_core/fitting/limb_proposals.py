@@ -8,6 +8,7 @@ in. The cheapest of many limbs of the pose prior, none like another, then compet
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -21,6 +22,7 @@ from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import RAY_SCALE_M
 from pop_core.fitting.robust_loss import geman_mcclure_share
 from pop_core.fitting.trials import Judge, cheapest, with_pose
+from pop_core.geometry.rotation import from_rotvec
 from pop_core.rendering.depth_renderer import render_depth
 from pop_core.retrieval.pose_prior import PosePrior
 
@@ -37,7 +39,8 @@ class LimbProposals:
 
     def __init__(self, prior: PosePrior) -> None:
         """Draw the limbs once."""
-        self.poses = prior.sample(np.random.default_rng(SEED), SAMPLES)
+        poses = prior.sample(np.random.default_rng(SEED), SAMPLES)
+        self._limbs = [_Limbs.of(list(poses), kind) for kind in KINDS]
 
     def improve(
         self, hypothesis: Hypothesis, donors: Sequence[Hypothesis], observation: Observation,
@@ -52,23 +55,50 @@ class LimbProposals:
             segment: Pixels of the person.
             judge: Sets the cost of hypotheses.
         """
-        theirs = [donor.state.parameters.body_pose[None] for donor in donors]
-        poses = np.concatenate([*theirs, self.poses])
-        for kind in KINDS:
-            trials = [_with_limb(hypothesis, kind, pose)
-                      for pose in _competing(hypothesis, kind, poses, observation, segment)]
+        for kind, of_prior in zip(KINDS, self._limbs, strict=True):
+            theirs, present = (
+                _Limbs.of([each.state.parameters.body_pose for each in bodies], kind)
+                for bodies in (donors, [hypothesis]))
+            # The last one is the present limb, which the others have to beat.
+            limbs = _Limbs.joined([theirs, of_prior, present])
+            trials = [_with_limb(hypothesis, kind, limb)
+                      for limb in _competing(hypothesis, kind, limbs, observation, segment)]
             hypothesis = cheapest(hypothesis, trials, judge, MARGIN)
         return hypothesis
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Limbs:
+    """Ways of one kind of limb to be bent.
+
+    Args:
+        rotvecs: Rotation of each joint that turns it [rad].
+        turns: The same as matrices.
+    """
+
+    rotvecs: Float[np.ndarray, 'n 3 3']
+    turns: Float[np.ndarray, 'n 3 3 3']
+
+    @classmethod
+    def of(cls, poses: Sequence[Float[np.ndarray, '23 3']], kind: LimbKind) -> _Limbs:
+        """Return the limbs of poses [rad]."""
+        rotvecs = np.reshape([pose[kind.rows] for pose in poses], (-1, 3, 3))
+        return cls(rotvecs, from_rotvec(rotvecs))
+
+    @classmethod
+    def joined(cls, parts: Sequence[_Limbs]) -> _Limbs:
+        """Return all limbs of several sets."""
+        return cls(
+            np.concatenate([part.rotvecs for part in parts]),
+            np.concatenate([part.turns for part in parts]))
+
+
 def _competing(
-    hypothesis: Hypothesis, kind: LimbKind, poses: Float[np.ndarray, 'n 23 3'],
-    observation: Observation, segment: Bool[np.ndarray, 'h w'],
+    hypothesis: Hypothesis, kind: LimbKind, limbs: _Limbs, observation: Observation,
+    segment: Bool[np.ndarray, 'h w'],
 ) -> Float[np.ndarray, 'k 3 3']:
     """Return the rotations of the cheapest limbs, none like another [rad], cheapest first."""
-    limbs = poses[:, kind.rows]
-    present = hypothesis.state.parameters.body_pose[None, kind.rows]
-    ways = limb_points(hypothesis.state, kind, np.concatenate([limbs, present]))
+    ways = limb_points(hypothesis.state, kind, limbs.turns)
     unexplained = segment & ~_explained_by_the_rest(hypothesis, kind, observation)
     cost = _keypoint_cost(ways, kind, observation) + _depth_cost(
         ways, observation, unexplained, max(int(segment.sum()), 1))
@@ -79,7 +109,7 @@ def _competing(
         apart_m = np.linalg.norm(ways.points[chosen] - ways.points[i], axis=-1).mean(axis=-1)
         if (apart_m > APART_M).all():
             chosen.append(int(i))
-    return limbs[chosen]
+    return limbs.rotvecs[chosen]
 
 
 def _explained_by_the_rest(
@@ -87,9 +117,8 @@ def _explained_by_the_rest(
 ) -> Bool[np.ndarray, 'h w']:
     """Return the pixels whose surface the body without a limb explains."""
     state = hypothesis.state
-    faces = state.body.faces
-    of_limb = np.isin(state.body.main_bone, kind.joints)[faces].any(axis=1)
-    rest = render_depth(state.vertices, faces[~of_limb], observation.camera).depth_m
+    faces = state.body.faces_without(kind.joints)
+    rest = render_depth(state.vertices, faces, observation.camera).depth_m
     with np.errstate(invalid='ignore'):
         return np.abs(rest - observation.depth_m) < EXPLAINED_M
 

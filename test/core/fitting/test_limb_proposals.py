@@ -12,9 +12,10 @@ from pop_core.fitting.body_state import FitBody
 from pop_core.fitting.energy import PriorBelief
 from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.fitting.hypotheses import Hypothesis, HypothesisSteps
-from pop_core.fitting.limb_points import KINDS, limb_points
+from pop_core.fitting.limb_points import HAND, KINDS, limb_points
 from pop_core.fitting.limb_proposals import LimbProposals
 from pop_core.fitting.observation import Observation, observe
+from pop_core.geometry.rotation import from_rotvec
 from pop_core.keypoints.lifted_joints import LiftedJoints, LiftState
 from pop_core.retrieval.pose_prior import load_pose_prior
 from pop_core.segmentation.body_segmentation import SegmentationConfig
@@ -97,8 +98,17 @@ def test_points_lie_on_the_bones_of_the_posed_body(
     body: BodyModel, person: BodyParameters, kind: object
 ) -> None:
     start = hypothesis(body, person, person.body_pose)
-    ways = limb_points(start.state, kind, person.body_pose[None, kind.rows])
-    np.testing.assert_allclose(ways.ends[0], start.state.joints[list(kind.joints[1:3])])
+    poses = np.stack([person.body_pose, np.zeros((23, 3))])
+    ways = limb_points(start.state, kind, from_rotvec(poses[:, kind.rows]))
+    for pose, points, ends in zip(poses, ways.points, ways.ends, strict=True):
+        rows = person.body_pose.copy()
+        rows[kind.rows] = pose[kind.rows]
+        joints = hypothesis(body, person, rows).state.joints[list(kind.joints)]
+        np.testing.assert_allclose(ends, joints[1:3])
+        bones = np.diff(joints, axis=0) * [[1.0], [1.0], [HAND]]
+        expected = np.concatenate([
+            joints[k] + np.outer(shares, bones[k]) for k, shares in enumerate(kind.shares)])
+        np.testing.assert_allclose(points, expected)
     assert ways.points.shape[1] == len(ways.width_m) == len(ways.length_m)
 
 
