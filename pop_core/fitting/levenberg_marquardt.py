@@ -13,10 +13,13 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.linalg import blas, lapack
 
+from pop_core.fitting import normal_kernels as kernels
+
 StateT = TypeVar('StateT')
 
 FIRST_DAMPING = 1e-3
 LARGEST_DAMPING = 1e6
+LEAST_CURVATURE = 1e-9  # where nothing bends the cost
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,30 +102,24 @@ def assemble(blocks: Sequence[Term], size: int) -> NormalEquations:
     linear = [
         block for block in blocks
         if isinstance(block, Residual) and block.J is not None and len(block.r)]
-    count = sum(len(block.r) for block in linear)
-    J, r, row = np.empty((count, size)), np.empty(count), 0
+    rows = np.empty((sum(len(block.r) for block in linear), size + 1))
+    first = 0
     for block in linear:
-        assert block.J is not None
-        root, rows = np.sqrt(block.w), slice(row, row + len(block.r))
-        np.multiply(block.J, root[:, None], out=J[rows])
-        r[rows] = root * block.r
-        row = rows.stop
+        last = first + len(block.r)
+        kernels.weigh(block.J, block.r, block.w, rows[first:last])
+        first = last
     # dsyrk forms one triangle only, half the work of a product; once, not block by block.
-    upper = blas.dsyrk(1.0, J.T, lower=0) if count else np.zeros((size, size))
-    gradient, hessian = J.T @ r, with_lower(upper)
+    upper = blas.dsyrk(1.0, rows.T) if len(rows) else np.zeros((size + 1, size + 1), order='F')
+    gradient, hessian = kernels.unfold(upper)
     for model in blocks:
         if isinstance(model, Quadratic) and model.gradient is not None:
-            own = slice(model.first, model.first + len(model.gradient))
-            gradient[own] += model.gradient
-            hessian[own, own] += model.hessian
+            kernels.add(model.gradient, model.hessian, model.first, gradient, hessian)
     return NormalEquations(cost_of(blocks), gradient, hessian)
 
 
 def with_lower(upper: Float[np.ndarray, 'x x']) -> Float[np.ndarray, 'x x']:
-    """Return the symmetric matrix of an upper triangle that has zeros below."""
-    out = upper + upper.T
-    out[np.diag_indices(len(out))] = np.diag(upper)
-    return np.asarray(out)
+    """Return the symmetric matrix of an upper triangle."""
+    return np.asarray(kernels.with_lower(upper))
 
 
 def damped_step(
@@ -133,16 +130,17 @@ def damped_step(
     Raises:
         np.linalg.LinAlgError: If the damped Hessian is not positive definite.
     """
-    free = slice(None) if active.all() else np.flatnonzero(active)
-    hessian = equations.hessian[free][:, free].copy()
+    free = active.nonzero()[0]
     # Damping relative to the diagonal makes the step independent of units (Marquardt 1963).
-    hessian[np.diag_indices(len(hessian))] += damping * (np.diag(hessian) + 1e-9)
-    step = np.zeros(len(equations.gradient))
-    # Cholesky: symmetric positive definite by construction.
-    factor, failed = lapack.dpotrf(hessian, overwrite_a=1)
+    damped, gradient = kernels.damp(
+        equations.hessian, equations.gradient, free, damping, LEAST_CURVATURE)
+    # Cholesky: symmetric positive definite by construction. LAPACK reads columns: of a symmetric
+    # matrix they are the rows.
+    factor, failed = lapack.dpotrf(damped.T, overwrite_a=1)
     if failed:
         raise np.linalg.LinAlgError('the damped Hessian is not positive definite')
-    step[free] = -lapack.dpotrs(factor, equations.gradient[free])[0]
+    step = np.zeros(len(equations.gradient))
+    step[free] = -lapack.dpotrs(factor, gradient)[0]
     return step
 
 

@@ -9,6 +9,7 @@ removal makes the rest fit far better is an outlier. The paper removes "unreliab
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32
@@ -35,7 +36,7 @@ def reject_outliers(
         lifted: Lifted joints of one person.
         config: Scale limits and tolerance of Eq. (1).
     """
-    columns = np.ascontiguousarray(library.columns[:, :, ::THIN])
+    columns = _thinned(library)
     for _ in range(MOST_DROPPED):
         seen = np.flatnonzero(lifted.lifted)
         if len(seen) <= FEWEST:
@@ -50,6 +51,12 @@ def reject_outliers(
             break
         lifted = _dropped(lifted, int(seen[worst]))
     return lifted
+
+
+@lru_cache(maxsize=2)
+def _thinned(library: PoseLibrary) -> Float32[np.ndarray, 's 3 m']:
+    """Return the joints of every so many poses [m]."""
+    return np.ascontiguousarray(library.columns[:, :, ::THIN])
 
 
 def _misfit(

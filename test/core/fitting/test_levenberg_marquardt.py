@@ -1,11 +1,16 @@
 import numpy as np
+import pytest
 
 from pop_core.fitting.levenberg_marquardt import (
     FIRST_DAMPING,
+    NormalEquations,
+    Quadratic,
     Residual,
     assemble,
     cost_of,
+    damped_step,
     levenberg_marquardt_step,
+    with_lower,
 )
 
 EVERYTHING = np.ones(2, dtype=bool)
@@ -59,3 +64,44 @@ def test_weighted_normal_equations_are_those_of_the_textbook() -> None:
     equations = assemble([Residual(r[:5], J[:5], w[:5]), Residual(r[5:], J[5:], w[5:])], 4)
     np.testing.assert_allclose(equations.hessian, J.T @ np.diag(w) @ J, atol=1e-12)
     np.testing.assert_allclose(equations.gradient, J.T @ (w * r), atol=1e-12)
+    np.testing.assert_allclose(equations.gradient, J.T @ (w * r), atol=1e-12)
+    np.testing.assert_array_equal(equations.hessian, equations.hessian.T)
+
+
+def test_quadratic_terms_add_to_the_parameters_they_are_of() -> None:
+    rng = np.random.default_rng(1)
+    r, J, w = rng.normal(size=9), rng.normal(size=(9, 5)), rng.random(9)
+    bend = rng.normal(size=(2, 2))
+    model = Quadratic(0.7, rng.normal(size=2), bend @ bend.T, first=1)
+    alone, both = (assemble(terms, 5) for terms in (
+        [Residual(r, J, w)], [Residual(r, J, w), Quadratic(0.1), model]))
+    grown, pulled = np.zeros((5, 5)), np.zeros(5)
+    grown[1:3, 1:3], pulled[1:3] = model.hessian, model.gradient
+    np.testing.assert_allclose(both.hessian, alone.hessian + grown, atol=1e-12)
+    np.testing.assert_allclose(both.gradient, alone.gradient + pulled, atol=1e-12)
+    assert np.isclose(both.cost, alone.cost + 0.8)
+
+
+def test_a_damped_step_solves_the_damped_system_of_what_may_move() -> None:
+    rng = np.random.default_rng(2)
+    J, gradient = rng.normal(size=(9, 5)), rng.normal(size=5)
+    equations = NormalEquations(1.0, gradient, J.T @ J)
+    for active in (np.ones(5, dtype=bool), np.array([True, False, True, True, False])):
+        free = np.flatnonzero(active)
+        system = (J.T @ J)[np.ix_(free, free)]
+        damped = system + 0.3 * np.diag(np.diag(system))
+        step = damped_step(equations, 0.3, active)
+        np.testing.assert_allclose(step[free], -np.linalg.solve(damped, gradient[free]), rtol=1e-6)
+        assert not step[~active].any()
+
+
+def test_a_system_that_bends_downward_has_no_step() -> None:
+    equations = NormalEquations(1.0, np.ones(3), -np.eye(3))
+    with pytest.raises(np.linalg.LinAlgError):
+        damped_step(equations, 1e-3, np.ones(3, dtype=bool))
+
+
+def test_upper_triangles_are_mirrored() -> None:
+    full = np.random.default_rng(3).normal(size=(6, 6))
+    full = full + full.T
+    np.testing.assert_array_equal(with_lower(np.triu(full)), full)
