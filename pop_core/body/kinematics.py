@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float
 
 from pop_core.body import skinning_kernels as kernels
+from pop_core.body.kinematics_kernels import pose_tree, turned
 from pop_core.body.model import AttachedPoints, BodyModel, BodyParameters, joint_points
-from pop_core.geometry.rotation import from_rotvec, to_rotvec
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,11 +31,9 @@ class PosedSkeleton:
 
 def pose_skeleton(model: BodyModel, parameters: BodyParameters) -> PosedSkeleton:
     """Return the posed tree of a body."""
-    rotvecs = np.vstack([parameters.global_orient, parameters.body_pose])
-    R_local = from_rotvec(rotvecs)
-    rest_joints = model.joint_template + model.joint_shapedirs @ parameters.betas
-    G, p = kernels.forward_kinematics(R_local, rest_joints, model.parents)
-    return PosedSkeleton(R_local, rest_joints, G, p)
+    return PosedSkeleton(*pose_tree(
+        parameters.global_orient, parameters.body_pose, parameters.betas, model.joint_template,
+        model.joint_shapedirs, model.parents))
 
 
 def joints(model: BodyModel, parameters: BodyParameters) -> Float[np.ndarray, '24 3']:
@@ -91,8 +89,7 @@ def increment(
     parameters: BodyParameters, step: Float[np.ndarray, 'x'], skeleton: PosedSkeleton
 ) -> BodyParameters:
     """Return parameters after a step; rotations turn from the left, in their parent's frame."""
-    turned = from_rotvec(step[3:75].reshape(24, 3)) @ skeleton.R_local
-    rotvecs = to_rotvec(turned)
+    rotvecs = turned(step[3:75].reshape(24, 3), skeleton.R_local)
     return BodyParameters(
         transl=parameters.transl + step[:3],
         global_orient=rotvecs[0],

@@ -39,13 +39,19 @@ class SkinningSubset:
         self, parameters: BodyParameters, skeleton: PosedSkeleton
     ) -> Float[np.ndarray, 'n 3']:
         """Return posed vertices [m] in the parameters' outer frame."""
-        return kernels.skin(
-            self.shaped(parameters, skeleton), self.bone_ids, self.bone_weights, skeleton.G,
-            skeleton.p, skeleton.rest_joints, parameters.scale, parameters.transl,
-        )
+        return self.posed(self.shaped(parameters, skeleton), parameters, skeleton)
+
+    def posed(
+        self, rest: Float[np.ndarray, 'n 3'], parameters: BodyParameters, skeleton: PosedSkeleton
+    ) -> Float[np.ndarray, 'n 3']:
+        """Return vertices [m] in the parameters' outer frame; `rest` is what `shaped` gives."""
+        return np.asarray(kernels.skin(
+            rest, self.bone_ids, self.bone_weights, skeleton.G, skeleton.p, skeleton.rest_joints,
+            parameters.scale, parameters.transl))
 
     def directional_jacobian(
         self,
+        rest: Float[np.ndarray, 'v 3'],
         parameters: BodyParameters,
         skeleton: PosedSkeleton,
         vertex: Int[np.ndarray, 'n'],
@@ -57,6 +63,7 @@ class SkinningSubset:
         linearisation sees them.
 
         Args:
+            rest: T-pose vertices that `shaped` gives [m].
             parameters: Where to linearise.
             skeleton: The posed tree of `parameters`.
             vertex: Index into this subset, one per row.
@@ -66,10 +73,8 @@ class SkinningSubset:
         _, e = kernels.joint_shape_derivatives(skeleton.G, model.joint_shapedirs, model.parents)
         out = np.empty((len(vertex), 3 + 72 + model.n_betas + 1))
         kernels.directional_jacobian(
-            vertex, direction, self.shaped(parameters, skeleton), self.shapedirs, self.bone_ids,
-            self.bone_weights, skeleton.G, skeleton.p, e, skeleton.rest_joints, model.parents,
-            parameters.scale, out,
-        )
+            vertex, direction, rest, self.shapedirs, self.bone_ids, self.bone_weights, skeleton.G,
+            skeleton.p, e, skeleton.rest_joints, model.parents, parameters.scale, out)
         return out
 
 

@@ -93,9 +93,14 @@ class BodyState:
         return pose_coordinates(self.parameters.body_pose)
 
     @cached_property
+    def rest(self) -> Float[np.ndarray, 'n 3']:
+        """Return the vertices of the shaped fitting mesh in T-pose [m], body frame."""
+        return self.body.skinning.shaped(self.parameters, self.skeleton)
+
+    @cached_property
     def vertices(self) -> Float[np.ndarray, 'n 3']:
         """Return the vertices of the fitting mesh [m], camera frame."""
-        return self.body.skinning.vertices(self.parameters, self.skeleton)
+        return self.body.skinning.posed(self.rest, self.parameters, self.skeleton)
 
     @cached_property
     def normals(self) -> Float[np.ndarray, 'n 3']:
@@ -130,7 +135,7 @@ class BodyState:
     ) -> Float[np.ndarray, 'n x']:
         """Return the derivative of `direction . vertex` per row."""
         return self.body.skinning.directional_jacobian(
-            self.parameters, self.skeleton, vertex, direction)
+            self.rest, self.parameters, self.skeleton, vertex, direction)
 
     def moved(self, step: Float[np.ndarray, 'x']) -> BodyState:
         """Return the state after a step."""

@@ -14,8 +14,8 @@ from jaxtyping import Float
 
 from pop_core.body.joint_limits import LOWER, TWIST_AXES, UPPER, pose_coordinates
 from pop_core.body.joints import JOINT_INDEX
+from pop_core.fitting.roll_kernels import reading_costs
 from pop_core.geometry.rotation import from_rotvec, to_rotvec
-from pop_core.geometry.swing_twist import to_swing_twist
 
 ROLLED_RAD = 0.35  # beyond its limits a limb is rolled; less is a limit that gave way
 ROLLS_RAD = np.deg2rad(np.arange(-180.0, 180.0, 7.5))
@@ -77,17 +77,12 @@ def easiest_reading(
     limb: HingedLimb, rotvecs: Float[np.ndarray, '2 3'], rest_joints: Float[np.ndarray, '24 3']
 ) -> Float[np.ndarray, '2 3']:
     """Return the rotations of upper bone and hinge [rad] that are easiest for the same joints."""
-    upper_bone, lower_bone = limb.bones(rest_joints)
-    upper_bone /= np.linalg.norm(upper_bone)
-    lower_bone /= np.linalg.norm(lower_bone)
-    roll, twist = (grid.reshape(-1, 1) for grid in np.meshgrid(ROLLS_RAD, ROLLS_RAD))
-    R_upper, R_hinge = from_rotvec(rotvecs)
-    turn = from_rotvec(roll * upper_bone)
-    readings = np.stack([
-        to_rotvec(R_upper @ turn),
-        to_rotvec(turn.transpose(0, 2, 1) @ R_hinge @ from_rotvec(twist * lower_bone))], axis=1)
+    bones = np.stack(limb.bones(rest_joints))
+    bones /= np.linalg.norm(bones, axis=1, keepdims=True)
     rows = [limb.upper - 1, limb.hinge - 1]
-    c = to_swing_twist(readings, TWIST_AXES[rows])
-    excess = np.maximum(c - UPPER[rows], 0.0) + np.minimum(c - LOWER[rows], 0.0)
-    cost = (excess**2 + EASE * c**2).sum(axis=(1, 2))
-    return readings[int(np.argmin(cost))]
+    cost = reading_costs(
+        rotvecs, bones, ROLLS_RAD, TWIST_AXES[rows], LOWER[rows], UPPER[rows], EASE)
+    twist, roll = np.unravel_index(np.argmin(cost), cost.shape)
+    R_upper, R_hinge = from_rotvec(rotvecs)
+    R_roll, R_twist = from_rotvec(bones * ROLLS_RAD[[roll, twist], None])
+    return to_rotvec(np.stack([R_upper @ R_roll, R_roll.T @ R_hinge @ R_twist]))

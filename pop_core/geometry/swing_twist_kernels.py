@@ -15,25 +15,30 @@ def decompose(rotvecs, twist_axes):
     q = np.empty(4)
     for i in range(rotvecs.shape[0]):
         for j in range(rotvecs.shape[1]):
-            _quaternion(rotvecs[i, j], q)
-            k = twist_axes[j]
-            a, b = (k + 1) % 3, (k + 2) % 3
-            w, t = q[3], q[k]
-            cosine = np.sqrt(w * w + t * t)  # of half the swing angle
-            if cosine < TINY:
-                w, t = 1.0, 0.0  # a half turn of the bone: any twist will do
-            else:
-                w, t = w / cosine, t / cosine
-            # swing = q * conj(twist) has no part along the twist axis
-            swing_a = q[a] * w - q[b] * t
-            swing_b = q[b] * w + q[a] * t
-            sine = np.sqrt(swing_a * swing_a + swing_b * swing_b)
-            factor = 2.0 if sine < TINY else 2.0 * np.arctan2(sine, cosine) / sine
-            twist = 2.0 * np.arctan2(t, w)
-            out[i, j, a] = factor * swing_a
-            out[i, j, b] = factor * swing_b
-            out[i, j, k] = twist - 2.0 * np.pi * np.round(twist / (2.0 * np.pi))
+            quaternion(rotvecs[i, j], q)
+            decompose_quaternion(q, twist_axes[j], out[i, j])
     return out
+
+
+@njit(cache=True, nogil=True)
+def decompose_quaternion(q, k, out):
+    """Fill coordinates (3) [rad] of a unit quaternion (scalar last, any sign), twist axis k."""
+    a, b = (k + 1) % 3, (k + 2) % 3
+    w, t = q[3], q[k]
+    cosine = np.sqrt(w * w + t * t)  # of half the swing angle
+    if cosine < TINY:
+        w, t = 1.0, 0.0  # a half turn of the bone: any twist will do
+    else:
+        w, t = w / cosine, t / cosine
+    # swing = q * conj(twist) has no part along the twist axis
+    swing_a = q[a] * w - q[b] * t
+    swing_b = q[b] * w + q[a] * t
+    sine = np.sqrt(swing_a * swing_a + swing_b * swing_b)
+    factor = 2.0 if sine < TINY else 2.0 * np.arctan2(sine, cosine) / sine
+    twist = 2.0 * np.arctan2(t, w)
+    out[a] = factor * swing_a
+    out[b] = factor * swing_b
+    out[k] = twist - 2.0 * np.pi * np.round(twist / (2.0 * np.pi))
 
 
 @njit(cache=True, nogil=True)
@@ -113,7 +118,8 @@ def increment_jacobian(coordinates, twist_axes):
 
 
 @njit(cache=True, nogil=True)
-def _quaternion(rotvec, q):
+def quaternion(rotvec, q):
+    """Fill the unit quaternion q (4), scalar last, of a rotation vector (3) [rad]."""
     angle = np.sqrt(rotvec[0] ** 2 + rotvec[1] ** 2 + rotvec[2] ** 2)
     factor = 0.5 if angle < TINY else np.sin(0.5 * angle) / angle
     q[0], q[1], q[2] = factor * rotvec[0], factor * rotvec[1], factor * rotvec[2]

@@ -111,4 +111,5 @@ def area_normals(vertices, faces, out):
     for i in range(out.shape[0]):
         length = np.sqrt(out[i, 0] ** 2 + out[i, 1] ** 2 + out[i, 2] ** 2)
         if length > 1e-12:
-            out[i] /= length
+            for c in range(3):
+                out[i, c] /= length

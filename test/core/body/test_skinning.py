@@ -14,6 +14,7 @@ from pop_core.body.kinematics import (
 )
 from pop_core.body.model import BodyModel, BodyParameters, shared_points
 from pop_core.body.skinning import SkinningSubset, vertices
+from pop_core.geometry.rotation import from_rotvec, to_rotvec
 
 STEP = 1e-5
 
@@ -61,8 +62,9 @@ def test_vertex_jacobian_is_the_derivative(
     n = len(random_model.v_template)
     direction = np.random.default_rng(2).normal(size=(n, 3))
     skeleton = pose_skeleton(random_model, random_parameters)
-    J = SkinningSubset(random_model).directional_jacobian(
-        random_parameters, skeleton, np.arange(n), direction)
+    skin = SkinningSubset(random_model)
+    rest = skin.shaped(random_parameters, skeleton)
+    J = skin.directional_jacobian(rest, random_parameters, skeleton, np.arange(n), direction)
     numeric = central_differences(
         random_model, random_parameters,
         lambda q: np.einsum('vc,vc->v', vertices(random_model, q), direction))
@@ -106,3 +108,19 @@ def test_turning_the_root_turns_everything_about_it(
     root = joints(random_model, random_parameters)[0]
     expected = turn.apply(vertices(random_model, random_parameters) - root) + root
     np.testing.assert_allclose(vertices(random_model, turned), expected, atol=1e-12)
+
+
+def test_trees_are_shaped_then_posed_and_steps_turn_from_the_left(
+    random_model: BodyModel, random_parameters: BodyParameters
+) -> None:
+    q, skeleton = random_parameters, pose_skeleton(random_model, random_parameters)
+    R_local = from_rotvec(np.vstack([q.global_orient, q.body_pose]))
+    np.testing.assert_allclose(skeleton.R_local, R_local, atol=1e-12)
+    np.testing.assert_allclose(
+        skeleton.rest_joints,
+        random_model.joint_template + random_model.joint_shapedirs @ q.betas, atol=1e-12)
+    step = np.random.default_rng(6).normal(size=86)
+    moved = increment(q, step, skeleton)
+    expected = to_rotvec(from_rotvec(step[3:75].reshape(24, 3)) @ R_local)
+    np.testing.assert_allclose(
+        np.vstack([moved.global_orient, moved.body_pose]), expected, atol=1e-9)

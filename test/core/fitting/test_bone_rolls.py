@@ -3,11 +3,21 @@
 import numpy as np
 import pytest
 
+from pop_core.body.joint_limits import LOWER, TWIST_AXES, UPPER
 from pop_core.body.joints import JOINT_INDEX
 from pop_core.body.kinematics import joints
 from pop_core.body.model import BodyModel, rest_parameters
-from pop_core.fitting.bone_rolls import LIMBS, HingedLimb, rolled_limbs, unrolled
+from pop_core.fitting.bone_rolls import (
+    EASE,
+    LIMBS,
+    ROLLS_RAD,
+    HingedLimb,
+    easiest_reading,
+    rolled_limbs,
+    unrolled,
+)
 from pop_core.geometry.rotation import from_rotvec, to_rotvec
+from pop_core.geometry.swing_twist import to_swing_twist
 from pop_core.synthesis.poses import POSE_KINDS, draw_pose
 
 LEFT_LEG, RIGHT_LEG, LEFT_ARM, RIGHT_ARM = LIMBS
@@ -84,3 +94,25 @@ def test_limbs_are_left_as_they_are_beside_a_rolled_one(body: BodyModel) -> None
     found = unrolled(pose, body.joint_template)
     others = [row for row in range(23) if row + 1 not in (LEFT_LEG.upper, LEFT_LEG.hinge)]
     np.testing.assert_array_equal(found[others], pose[others])
+
+
+@pytest.mark.parametrize('limb', LIMBS)
+def test_the_easiest_reading_is_the_cheapest_of_the_grid(
+    body: BodyModel, limb: HingedLimb
+) -> None:
+    rng = np.random.default_rng(limb.upper)
+    rows = [limb.upper - 1, limb.hinge - 1]
+    upper_bone, lower_bone = (
+        bone / np.linalg.norm(bone) for bone in limb.bones(body.joint_template))
+    rotvecs = rng.normal(size=(2, 3))
+    R_upper, R_hinge = from_rotvec(rotvecs)
+    roll, twist = (grid.reshape(-1, 1) for grid in np.meshgrid(ROLLS_RAD, ROLLS_RAD))
+    turn = from_rotvec(roll * upper_bone)
+    every = np.stack([
+        to_rotvec(R_upper @ turn),
+        to_rotvec(turn.transpose(0, 2, 1) @ R_hinge @ from_rotvec(twist * lower_bone))], axis=1)
+    c = to_swing_twist(every, TWIST_AXES[rows])
+    excess = np.maximum(c - UPPER[rows], 0.0) + np.minimum(c - LOWER[rows], 0.0)
+    cheapest = every[np.argmin((excess**2 + EASE * c**2).sum(axis=(1, 2)))]
+    np.testing.assert_allclose(
+        easiest_reading(limb, rotvecs, body.joint_template), cheapest, atol=1e-9)
