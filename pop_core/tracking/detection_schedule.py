@@ -15,6 +15,9 @@ LONG_GAP_S = 0.12  # between two frames of a camera: people move far, and there 
 BLURRED_M, MOVING_M = 0.028, 0.05
 MOST_TRIES = 3  # whom looks go on contradicting is no news any more
 SOON = 2  # frames from one look to the next while somebody is not followed well
+# Frames are counted as of such a camera: at a lower rate people move farther from one to the next.
+RATE_HZ = 30.0
+LONGEST_S = 1000.0  # that is counted: before the first frame lies an eternity
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +38,14 @@ class Gap:
         return self.duration_s > LONG_GAP_S
 
     @property
+    def of_camera_s(self) -> float:
+        """Return the time from one frame of the camera to the next [s]."""
+        return self.duration_s / (self.skipped + 1)
+
+    @property
     def is_of_slow_camera(self) -> bool:
         """Return whether it is the camera that leaves people unseen, and not we."""
-        return self.duration_s / (self.skipped + 1) > LONG_GAP_S
+        return self.of_camera_s > LONG_GAP_S
 
 
 class DetectionSchedule:
@@ -46,7 +54,7 @@ class DetectionSchedule:
     def __init__(self, config: TrackingConfig) -> None:
         """Ask at the first frame."""
         self._config = config
-        self._frames_since = config.detect_every
+        self._frames_since, self._since_s = config.detect_every, 0.0
 
     @property
     def has_looked(self) -> bool:
@@ -67,6 +75,7 @@ class DetectionSchedule:
             is_looking: Whether a look at an earlier frame is still being made.
         """
         self._frames_since += 1
+        self._since_s += gap.of_camera_s
         if is_looking or (not tracks and is_busy and not is_late):
             return False
         every = self._config.detect_every
@@ -76,9 +85,10 @@ class DetectionSchedule:
             every = 1
         # A look of our own that took long is no reason for the next.
         after_gap = gap.is_long and (gap.is_of_slow_camera or self._frames_since > 1)
-        if tracks and not (is_late or after_gap) and self._frames_since < every:
+        frames = max(self._frames_since, round(min(self._since_s, LONGEST_S) * RATE_HZ))
+        if tracks and not (is_late or after_gap) and frames < every:
             return False
-        self._frames_since = 0
+        self._frames_since, self._since_s = 0, 0.0
         return True
 
 

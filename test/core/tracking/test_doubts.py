@@ -18,7 +18,7 @@ from pop_core.tracking.rivals import lead
 from pop_core.tracking.track import PersonTrack
 from pop_core.tracking.tracking_config import TrackingConfig
 
-FRAME = Gap(1.0 / RATE_HZ)
+FRAME = Gap(1.0 / 30.0)
 FRAME_NS = round(1e9 / RATE_HZ)
 
 

@@ -157,7 +157,7 @@ def test_who_was_fitted_in_vain_is_told_why(
     # Told once, and looked for again no sooner than others are.
     assert told[0] == 'NO_SUPPORT'
     assert set(told[1:]) == {'WAITING'}
-    assert stage.source.asked - looks <= 3
+    assert stage.source.asked - looks <= 4
 
 
 def test_one_more_than_the_most_is_told_so(stage: Stage, person: BodyParameters) -> None:
@@ -221,6 +221,16 @@ def test_a_long_look_is_no_reason_for_the_next_one(tracks: list[PersonTrack]) ->
     assert schedule.is_due(tracks, own)  # something else did
     assert schedule.is_due(tracks, slow)
     assert [schedule.is_due(tracks, QUICK) for _ in range(4)] == [False, False, True, False]
+
+
+def test_cameras_of_less_than_30_hz_are_looked_at_as_often_in_time(
+    tracks: list[PersonTrack]
+) -> None:
+    for rate_hz, looks in ((30.0, 20), (15.0, 15), (10.0, 20)):
+        schedule = DetectionSchedule(TrackingConfig(detect_every=3))
+        frames = round(2 * rate_hz)
+        asked = sum(schedule.is_due(tracks, Gap(1 / rate_hz)) for _ in range(frames))
+        assert asked == pytest.approx(looks, abs=1)
 
 
 def test_a_node_that_was_slow_once_does_not_stay_slow(

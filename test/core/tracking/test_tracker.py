@@ -37,7 +37,7 @@ def test_a_walker_keeps_the_id_and_is_followed(
 def test_the_detector_is_asked_every_few_frames_only(
     body: BodyModel, person: BodyParameters
 ) -> None:
-    stage = Stage(body, TrackingConfig(detect_every=3))
+    stage = Stage(body, TrackingConfig(detect_every=round(3 * 30.0 / RATE_HZ)))
     stage.show(person, times=4)
     before = stage.source.asked
     stage.show(person, times=9)
