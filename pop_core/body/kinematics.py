@@ -60,8 +60,8 @@ def attached_places(
 ) -> Float[np.ndarray, 'n 3']:
     """Return points carried by joints of a posed tree [m], before scale and translation."""
     return np.asarray(kernels.attached_places(
-        points.joint, points.template + points.shapedirs @ betas, skeleton.rest_joints,
-        skeleton.G, skeleton.p))
+        points.joint, points.template, points.shapedirs, betas, skeleton.rest_joints, skeleton.G,
+        skeleton.p))
 
 
 def attached_jacobian(

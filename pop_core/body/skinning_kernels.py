@@ -61,15 +61,23 @@ def joint_shape_derivatives(G, joint_shapedirs, parents):
 
 
 @njit(cache=True, nogil=True)
-def attached_places(joint, rest, rest_joints, G, p):
-    """Return where points (n,3) that hang on joints (n) at rest are in a posed tree [m]."""
-    out = np.empty(rest.shape)
-    for i in range(rest.shape[0]):
+def attached_places(joint, template, shapedirs, betas, rest_joints, G, p):
+    """Return where points (n,3) that hang on joints (n) are in a posed tree [m].
+
+    template (n,3) and shapedirs (n,3,B) tell where they are at rest.
+    """
+    out = np.empty(template.shape)
+    arm = np.empty(3)
+    for i in range(template.shape[0]):
         j = joint[i]
+        for c in range(3):
+            arm[c] = template[i, c] - rest_joints[j, c]
+            for b in range(betas.shape[0]):
+                arm[c] += shapedirs[i, c, b] * betas[b]
         for r in range(3):
             out[i, r] = p[j, r]
             for c in range(3):
-                out[i, r] += G[j, r, c] * (rest[i, c] - rest_joints[j, c])
+                out[i, r] += G[j, r, c] * arm[c]
     return out
 
 

@@ -9,7 +9,7 @@ from pop_core.body.joints import N_JOINTS, PARENTS
 from pop_core.depth_noise import DepthNoise
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.depth_consistency import Sight, Visibility
-from pop_core.fitting.nearest_kernels import nearest
+from pop_core.fitting.nearest_kernels import nearest, shrunk
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.pair_kernels import merge_axes, plane_pairs
 from pop_core.fitting.residuals import Pairs, no_pairs
@@ -96,24 +96,10 @@ def nearest_as_sensors_err(
     middle_m = np.median(points[:, 2], keepdims=True)
     off_m = max(scale_m - UNSETTLED_M, SKIN_SIGMA_M)
     shrink = float(off_m / np.hypot(off_m, noise.sigma_m(middle_m))[0])
-    return np.asarray(nearest(
-        shrunk_along_rays(points, float(middle_m[0]), shrink),
-        shrunk_along_rays(surface, float(middle_m[0]), shrink))[0])
-
-
-def shrunk_along_rays(
-    p_camera: Float[np.ndarray, 'n 3'], middle_m: float, shrink: float
-) -> Float[np.ndarray, 'n 3']:
-    """Return points [m] at coordinates in which distances along rays are shrunk.
-
-    Args:
-        p_camera: Points.
-        middle_m: Depth at which distances across rays keep their length [m].
-        shrink: Factor of distances along rays.
-    """
     # Behind the camera nothing is measured: there a vertex only has to stay away from all points.
-    widen = middle_m / np.maximum(p_camera[:, 2], NEAREST_M)
-    return np.column_stack([p_camera[:, :2] * widen[:, None], shrink * p_camera[:, 2]])
+    places, found = (
+        shrunk(p_camera, float(middle_m[0]), shrink, NEAREST_M) for p_camera in (surface, points))
+    return np.asarray(nearest(found, places)[0])
 
 
 def match_vertices(

@@ -39,7 +39,7 @@ class Residual:
     @property
     def cost(self) -> float:
         """Return 1/2 sum w r^2."""
-        return 0.5 * float(np.dot(self.w * self.r, self.r))
+        return 0.5 * float((self.w * self.r).dot(self.r))
 
     def first(self, n: int) -> Residual:
         """Return the first n residuals."""

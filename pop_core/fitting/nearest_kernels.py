@@ -1,4 +1,4 @@
-"""Numba kernel of exact nearest neighbours between a measured surface and a mesh.
+"""Numba kernels of exact nearest neighbours between a measured surface and a mesh.
 
 Both are thin in depth, so a grid over x and y finds a neighbour in a handful of comparisons. A
 tree takes three times as long, most of it to be built for a single query.
@@ -11,6 +11,20 @@ from numba import njit
 
 CELL_M = 0.05
 MOST_CELLS = 256  # along an axis: a place far off makes cells larger, not more
+
+
+@njit(cache=True, nogil=True)
+def shrunk(p_camera, middle_m, shrink, nearest_m):
+    """Return points (n,3) [m] at coordinates in which distances along rays are shrunk.
+
+    Distances across rays keep their length at depth middle_m; nothing is nearer than nearest_m.
+    """
+    out = np.empty(p_camera.shape)
+    for i in range(p_camera.shape[0]):
+        widen = middle_m / max(p_camera[i, 2], nearest_m)
+        out[i, 0], out[i, 1] = p_camera[i, 0] * widen, p_camera[i, 1] * widen
+        out[i, 2] = shrink * p_camera[i, 2]
+    return out
 
 
 @njit(cache=True, nogil=True)
@@ -38,7 +52,7 @@ def _grid(places):
     return x0, y0, cell, columns, rows, first, order
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline='always')  # the call would cost as much as its loop
 def _nearest_of(begin, end, order, places, x, y, z, best, found):
     """Return squared distance and index of the nearest so far, some cells of a row looked at."""
     for k in range(begin, end):

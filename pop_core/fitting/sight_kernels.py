@@ -53,8 +53,10 @@ def mean_misfit(body, measured, segment, limit):
     h, w = measured.shape
     for y in range(h):
         for x in range(w):
-            depth = measured[y, x]
             count += segment[y, x]
+            if body[y, x] == np.inf and not segment[y, x]:
+                continue  # most of an image
+            depth = measured[y, x]
             if np.isnan(depth):
                 continue  # what was not measured can hide anything, so it costs nothing
             if segment[y, x]:
