@@ -70,11 +70,13 @@ class PersonFit:
         status: Why there is no body, or that there is one.
         estimate: The body as the pipeline's users get it.
         fit: The body as the fit left it.
+        observation: What it was fitted to.
     """
 
     status: EstimateStatus
     estimate: BodyEstimate | None = None
     fit: BodyFit | None = None
+    observation: Observation | None = None
 
 
 class BodyPipeline:
@@ -160,8 +162,18 @@ class BodyPipeline:
         if self.admit(lifted) is not EstimateStatus.OK:
             return person
         again = self._fit_as_named(scene, other, lifted, watch)
-        better = again.estimate is not None and again.estimate.score > score + CLEARLY_BETTER
-        return again if better else person
+        if again.estimate is None or again.estimate.score < score + CLEARLY_BETTER:
+            return person
+        return again if self._costs_less(again, person) else person
+
+    def _costs_less(self, person: PersonFit, other: PersonFit) -> bool:
+        """Return whether a fit explains a person at less cost than another, each as it read it."""
+        if person.fit is None or other.fit is None:
+            return other.fit is None
+        assert person.observation is not None and other.observation is not None
+        ours, theirs = self.fitter.costs(
+            [person.fit, other.fit], [person.observation, other.observation])
+        return ours < theirs
 
     def _fit_as_named(
         self,
@@ -191,7 +203,7 @@ class BodyPipeline:
             estimate, support = self.estimate(scene, fit, plausibility(fit, lifted))
         if support < self.config.min_support:
             return PersonFit(EstimateStatus.NO_SUPPORT)
-        return PersonFit(EstimateStatus.OK, estimate, fit)
+        return PersonFit(EstimateStatus.OK, estimate, fit, observation)
 
     def lift(self, frame: RgbdFrame, detection: Detection) -> LiftedJoints:
         """Return the joints of a detection in 3D, without those that no pose explains."""

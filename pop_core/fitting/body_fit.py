@@ -120,6 +120,30 @@ class BodyFitter:
         fit = self._finish(body, others, named, left)
         return replace(fit, sides_exchanged=named is not observation)
 
+    def costs(
+        self, fits: Sequence[BodyFit], observations: Sequence[Observation]
+    ) -> list[float]:
+        """Return what each of several fits of one person costs, on the pixels of all of them.
+
+        Args:
+            fits: Bodies.
+            observations: What each was fitted to: keypoints read differently, one person.
+        """
+        window = observations[0]
+        # One window for all: where another lies depends on what was lifted.
+        read = [
+            replace(window, lifted=each.lifted, keypoint_rays=each.keypoint_rays)
+            for each in observations]
+        bodies = [
+            Hypothesis(fit.coarse, PriorBelief(
+                self.prior, fit.parameters.body_pose, np.ones(len(fit.parameters.body_pose))))
+            for fit in fits]
+        segment = self.steps.common_segment(bodies, window)
+        for fit, body, seen in zip(fits, bodies, read, strict=True):
+            named = seen.with_sides_exchanged() if fit.sides_exchanged else seen
+            self.steps.score([body], named, segment)
+        return [body.cost for body in bodies]
+
     def _start(self, candidate: PoseCandidate, all_of_them: Sequence[PoseCandidate]) -> Hypothesis:
         parameters = initial_parameters(self.model, candidate)
         belief = PriorBelief(self.prior, parameters.body_pose, neighbour_sigma_rad(all_of_them))
