@@ -168,9 +168,10 @@ class BodyPipeline:
 
     def _costs_less(self, person: PersonFit, other: PersonFit) -> bool:
         """Return whether a fit explains a person at less cost than another, each as it read it."""
-        if person.fit is None or other.fit is None:
-            return other.fit is None
-        assert person.observation is not None and other.observation is not None
+        if person.fit is None or person.observation is None:
+            return False
+        if other.fit is None or other.observation is None:
+            return True
         ours, theirs = self.fitter.costs(
             [person.fit, other.fit], [person.observation, other.observation])
         return ours < theirs

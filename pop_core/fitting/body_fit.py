@@ -14,7 +14,7 @@ from pop_core.fitting.depth_consistency import Visibility, depth_energy, see_bod
 from pop_core.fitting.disagreement import Disagreement, disagreement, unnamed_joints
 from pop_core.fitting.energy import PAIR_BLOCKS, PRIOR_BLOCKS, BodyEnergy, PriorBelief
 from pop_core.fitting.fitting_config import FittingConfig
-from pop_core.fitting.hypotheses import WIDEST_M, Hypothesis, HypothesisSteps
+from pop_core.fitting.hypotheses import WIDEST_M, Hypothesis, HypothesisSteps, majority
 from pop_core.fitting.initialisation import initial_parameters
 from pop_core.fitting.levenberg_marquardt import assemble, cost_of
 from pop_core.fitting.limb_exchange import exchange_limbs
@@ -23,6 +23,7 @@ from pop_core.fitting.observation import Observation
 from pop_core.fitting.priors import neighbour_sigma_rad
 from pop_core.fitting.readings import best_facing, best_reading
 from pop_core.fitting.trials import Judge
+from pop_core.fitting.unclaimed_surface import UnclaimedSurface
 from pop_core.retrieval.candidate import PoseCandidate
 from pop_core.retrieval.pose_prior import PosePrior
 from pop_core.segmentation.body_segmentation import SegmentationConfig
@@ -86,13 +87,14 @@ class BodyFitter:
         and 7), the best of those, with limbs of the others where they serve better, to the end
         with the free space (step 8). Limbs that still explain little are looked for anew.
         """
+        unclaimed = UnclaimedSurface(observation)
         started = [self._start(candidate, candidates) for candidate in candidates]
         for hypothesis in started:
             self.steps.fit_joints(hypothesis, observation)
         hypotheses = _best(started, self.config.surface_hypotheses)
         for hypothesis in hypotheses:
             self.steps.fit_surface(hypothesis, observation, EARLY_SCALES_M, free_space=False)
-        judge = self._judge(observation, self._compare(hypotheses, observation))
+        judge = self._judge(observation, self._compare(hypotheses, observation, unclaimed))
         hypotheses = [
             exchange_limbs(hypothesis, [h for h in started if h is not hypothesis], judge)
             for hypothesis in _best(hypotheses, self.config.final_hypotheses)]
@@ -100,13 +102,13 @@ class BodyFitter:
             hypotheses = [best_reading(each, observation, judge) for each in hypotheses]
         for hypothesis in hypotheses:
             self.steps.fit_surface(hypothesis, observation, LATE_SCALES_M, free_space=True)
-        segment = self._compare(hypotheses, observation)
+        segment = self._compare(hypotheses, observation, unclaimed)
         for _ in range(self.config.limb_searches):
             found = self._with_limbs_found(hypotheses, started, observation, segment)
             kept = _best([*hypotheses, *found], len(hypotheses))
             if not any(each in found for each in kept):
                 break
-            hypotheses, segment = kept, self._compare(kept, observation)
+            hypotheses, segment = kept, self._compare(kept, observation, unclaimed)
         winner, *others = _best(hypotheses, len(hypotheses))
         named = observation
         if self.config.other_readings:
@@ -165,10 +167,16 @@ class BodyFitter:
         return found
 
     def _compare(
-        self, hypotheses: Sequence[Hypothesis], observation: Observation
+        self, hypotheses: Sequence[Hypothesis], observation: Observation,
+        unclaimed: UnclaimedSurface,
     ) -> Bool[np.ndarray, 'h w']:
-        """Set costs by E_depth over the pixels that most agree on; return those pixels."""
-        segment = self.steps.common_segment(hypotheses, observation)
+        """Set costs by E_depth over the pixels to explain; return those pixels.
+
+        They are what most hypotheses call the person's, and what none does though it hangs
+        together with the skeleton.
+        """
+        claims = self.steps.claims(hypotheses, observation)
+        segment = majority(claims) | unclaimed.pieces(np.any(claims, axis=0))
         self._judge(observation, segment)(hypotheses)
         return segment
 

@@ -133,8 +133,14 @@ class HypothesisSteps:
         self, hypotheses: Sequence[Hypothesis], observation: Observation
     ) -> Bool[np.ndarray, 'h w']:
         """Return the pixels that at least half of the hypotheses call the person."""
-        votes = [self.segment(render_body(h.state, observation), observation) for h in hypotheses]
-        return np.asarray(np.mean(votes, axis=0) >= 0.5)
+        return majority(self.claims(hypotheses, observation))
+
+    def claims(
+        self, hypotheses: Sequence[Hypothesis], observation: Observation
+    ) -> Bool[np.ndarray, 'k h w']:
+        """Return the pixels that each hypothesis calls the person."""
+        return np.array([
+            self.segment(render_body(h.state, observation), observation) for h in hypotheses])
 
     def segment(
         self, rendered: RenderedDepth, observation: Observation
@@ -210,3 +216,8 @@ class HypothesisSteps:
         active[TRANSL], active[GLOBAL_ORIENT], active[-1] = True, True, True
         active[betas_slice(self.model.n_betas)] = betas
         return active
+
+
+def majority(claims: Bool[np.ndarray, 'k h w']) -> Bool[np.ndarray, 'h w']:
+    """Return the pixels that at least half of several masks hold."""
+    return np.asarray(claims.mean(axis=0) >= 0.5)

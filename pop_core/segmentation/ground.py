@@ -70,7 +70,7 @@ def find_ground(frame: RgbdFrame, tries: int = 60) -> Ground | None:
         frame: An undistorted frame.
         tries: How many points, evenly over the upward ones, propose a plane.
     """
-    points, normals = _points_and_normals(frame.depth_m, frame.camera)
+    points, normals = points_and_normals(frame.depth_m, frame.camera)
     upward = np.flatnonzero(_upward(normals))
     if len(upward) < MIN_SHARE * len(points) or len(points) < 50:
         return None
@@ -130,11 +130,16 @@ def _refine(
     return Ground(normal, float(-normal @ centre))
 
 
-def _points_and_normals(
+def grid_stride(shape: tuple[int, ...]) -> int:
+    """Return every how many-th pixel of an image is taken into the thinned cloud."""
+    return max(1, max(shape) // GRID_PX)
+
+
+def points_and_normals(
     depth_m: Float32[np.ndarray, 'h w'], camera: Camera
 ) -> tuple[Float[np.ndarray, 'n 3'], Float[np.ndarray, 'n 3']]:
     """Return a thinned cloud [m] and its unit normals toward the camera."""
-    stride = max(1, max(depth_m.shape) // GRID_PX)
+    stride = grid_stride(depth_m.shape)
     # A median: single pixels are noisy.
     smooth = cv2.medianBlur(np.nan_to_num(depth_m[::stride, ::stride]), 3)
     v, u = np.mgrid[0: depth_m.shape[0]: stride, 0: depth_m.shape[1]: stride]

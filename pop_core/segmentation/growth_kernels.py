@@ -89,3 +89,46 @@ def flood(inside, allowed):
             inside[ny, nx] = True
             queue[tail, 0], queue[tail, 1] = ny, nx
             tail += 1
+
+
+@njit(cache=True, nogil=True)
+def creep(inside, allowed, depth, step, step_per_square, centres, reach, fx, fy, cx, cy):
+    """Add to `inside` what hangs together with it by small steps of depth, within reach.
+
+    Args:
+        inside: (h,w) pixels to begin with.
+        allowed: (h,w) pixels that may join.
+        depth: (h,w) measured depth [m].
+        step: Most depth between neighbours [m].
+        step_per_square: Growth of it with the square of depth [1/m].
+        centres: (k,3) points, camera frame [m].
+        reach: (k) how far from each of them a pixel may lie [m].
+        fx: Focal length across [px].
+        fy: The same down.
+        cx: Column of the principal point [px].
+        cy: Row of it.
+    """
+    h, w = inside.shape
+    queue, tail = _listed(inside)
+    head = 0
+    while head < tail:
+        y, x = queue[head, 0], queue[head, 1]
+        head += 1
+        here = depth[y, x]
+        for k in range(4):
+            ny, nx = _beside(y, x, k)
+            if ny < 0 or nx < 0 or ny >= h or nx >= w or inside[ny, nx] or not allowed[ny, nx]:
+                continue
+            z = depth[ny, nx]
+            if not abs(z - here) < step + step_per_square * here * here:
+                continue
+            near = False
+            for c in range(len(reach)):
+                dx = (nx - cx) / fx * z - centres[c, 0]
+                dy = (ny - cy) / fy * z - centres[c, 1]
+                dz = z - centres[c, 2]
+                near |= dx * dx + dy * dy + dz * dz < reach[c] * reach[c]
+            if near:
+                inside[ny, nx] = True
+                queue[tail, 0], queue[tail, 1] = ny, nx
+                tail += 1

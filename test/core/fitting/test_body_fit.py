@@ -1,5 +1,7 @@
 """The fit recovers what it was shown."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.one_person import CAMERA, lift_truth, photograph
@@ -21,8 +23,8 @@ from pop_core.retrieval.pose_prior import load_pose_prior
 from pop_core.rgbd import RgbdFrame
 
 NOBODY = np.zeros((CAMERA.height, CAMERA.width), dtype=bool)
-LEGS = tuple(SHARED_INDEX[f'{side}_{name}'] for side in ('left', 'right')
-             for name in ('knee', 'ankle'))
+SIDES = ('left', 'right')
+LEGS = tuple(SHARED_INDEX[f'{side}_{name}'] for side in SIDES for name in ('knee', 'ankle'))
 
 
 def candidate(body: BodyModel, pose: BodyParameters) -> PoseCandidate:
@@ -102,6 +104,53 @@ def test_runners_up_are_reported(
     result = fit(fitter, photograph(body, person), lift_truth(body, person), start)
     assert len(result.runners_up) == fitter.config.final_hypotheses - 1
     assert set(result.energies) == {'E_J3D', 'E_prior', 'E_NN', 'E_depth'}
+
+
+def test_an_arm_that_stands_clear_is_found_though_its_keypoints_lie_on_the_other(
+    fitter: BodyFitter, body: BodyModel, person: BodyParameters
+) -> None:
+    """No body near the keypoints touches the arm's surface, but it hangs on the shoulder."""
+    pose = person.body_pose.copy()
+    pose[JOINT_INDEX['left_shoulder'] - 1, 2] += 1.6
+    waving = person.replaced(body_pose=pose)
+    names = ('elbow', 'wrist')
+    left, right = ([SHARED_INDEX[f'{side}_{name}'] for name in names] for side in SIDES)
+    lifted = lift_truth(body, waving)
+    positions, pixels = lifted.positions_camera.copy(), lifted.keypoints_px.copy()
+    positions[left], pixels[left] = positions[right] + [0.05, 0.0, 0.0], pixels[right]
+    wrong = replace(lifted, positions_camera=positions, keypoints_px=pixels)
+    start = [disturbed(person, seed, 0.1) for seed in range(3)]
+    result = fit(fitter, photograph(body, waving), wrong, start)
+    error = np.linalg.norm(joints(body, result.parameters) - joints(body, waving), axis=1)
+    assert error[[JOINT_INDEX[f'left_{name}'] for name in names]].max() < 0.04
+
+
+def test_the_body_that_was_photographed_costs_less_than_another(
+    fitter: BodyFitter, body: BodyModel, person: BodyParameters
+) -> None:
+    frame, lifted = photograph(body, person), lift_truth(body, person)
+    observation = observe(frame, lifted, NOBODY)
+    right = fit(fitter, frame, lifted, [disturbed(person, 0, 0.1)])
+    away = person.replaced(transl=person.transl + [0.1, 0.0, 0.0])
+    wrong = replace(right, coarse=fitter.coarse.state(away), parameters=away)
+    ours, theirs = fitter.costs([right, wrong], [observation, observation])
+    assert ours < theirs
+    np.testing.assert_allclose(
+        fitter.costs([wrong, right], [observation, observation]), [theirs, ours])
+
+
+def test_a_body_costs_by_its_own_reading_of_the_keypoints(
+    fitter: BodyFitter, body: BodyModel, person: BodyParameters
+) -> None:
+    frame, lifted = photograph(body, person), lift_truth(body, person)
+    named = observe(frame, lifted, NOBODY)
+    exchanged = observe(frame, lifted.with_sides_exchanged(), NOBODY)
+    body_fit = fit(fitter, frame, lifted, [disturbed(person, 0, 0.1)])
+    turned = replace(body_fit, sides_exchanged=True)
+    as_named, as_exchanged, undone = fitter.costs(
+        [body_fit, body_fit, turned], [named, exchanged, exchanged])
+    assert as_named < as_exchanged
+    assert undone == pytest.approx(as_named)
 
 
 def test_points_recognised_as_a_far_part_do_not_pull(
