@@ -14,17 +14,23 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Int32
 
 from pop_core.fitting.body_state import BodyState
+from pop_core.fitting.free_space_kernels import (
+    gaps_along_rays,
+    hidden_places,
+    hiding_slices,
+    pulls_aside,
+)
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import Pairs, join_pairs
-from pop_core.fitting.robust_loss import geman_mcclure_weight
 from pop_core.fitting.sight_kernels import mean_misfit, see
-from pop_core.geometry.nearest_pixel_kernels import nearest_pixels, nearest_rows
+from pop_core.geometry.nearest_pixel_kernels import nearest_rows
 from pop_core.rendering.depth_renderer import RenderedDepth, render_depth
 
 SELF_TOLERANCE_M = 0.03  # z-buffer against vertex: a triangle's own slope
 CLOTHES_M = 0.03  # measured skin is cloth: it lies this far in front of the body at most
 SMALL_GAP_M = 0.12  # up to here a body is pushed back along the ray, beyond it sideways
 FREE_SIGMA_M = 0.03
+PULL_SCALE_M = 0.3  # of the robust kernel of pulls sideways
 DEPTH_SLICES = 5
 DEPTH_LIMIT_M = 0.15  # a pixel's error in E_depth counts up to here
 
@@ -94,21 +100,14 @@ class HidingPlaces:
         self, points: Float[np.ndarray, 'n 3']
     ) -> tuple[Float[np.ndarray, 'n 3'], Bool[np.ndarray, 'n']]:
         """Return the nearest hidden place at each point's depth [m], and whether there is one."""
-        _, uv = self.observation.depth_at(points)
-        h, w = self.observation.depth_m.shape
-        uv = np.clip(uv, 0, [w - 1, h - 1])  # by rounding, half a pixel may be another
-        # The slice before a point's depth is the cautious one: what hides there, hides it.
-        which = np.searchsorted(self.slices_m, points[:, 2], side='right') - 1
-        which = np.clip(which, 0, DEPTH_SLICES - 1)
-        pixel = np.full((len(points), 2), -1)
-        for k in np.unique(which):
-            rows = which == k
-            # Every other pixel: a pull sideways need not know its end to the pixel.
-            pixel[rows] = nearest_pixels(self._slice(int(k)), uv[rows] // 2)
-        known = pixel[:, 0] >= 0
-        pixel = 2 * np.maximum(pixel, 0)
-        ray = self.observation.rays[pixel[:, 1], pixel[:, 0]]
-        return np.column_stack([ray * points[:, 2:], points[:, 2]]), known
+        which = hiding_slices(points[:, 2], self.slices_m)
+        target = np.full(points.shape, np.nan)
+        camera = self.observation.camera
+        for k in set(which.tolist()):
+            hidden_places(
+                self._slice(k), points, which == k, camera.fx, camera.fy, camera.cx, camera.cy,
+                self.observation.rays, target)
+        return target, ~np.isnan(target[:, 0])
 
     def _slice(self, k: int) -> Int32[np.ndarray, 'h w']:
         if k not in self._rows:
@@ -128,20 +127,13 @@ def free_space_pairs(
     the limb is elsewhere: it is pulled sideways toward the nearest pixel that can hide it at its
     depth.
     """
-    broken = visibility.sight == Sight.CONTRADICTED
-    small = np.flatnonzero(broken & (visibility.gap_m <= SMALL_GAP_M))
-    large = np.flatnonzero(broken & (visibility.gap_m > SMALL_GAP_M))
-    points = state.vertices[small]
-    ray = points / np.linalg.norm(points, axis=1, keepdims=True)
-    behind = points * (1 + visibility.gap_m[small] / points[:, 2])[:, None]
-    along = Pairs(small, ray, behind, np.full(len(small), 0.5 / FREE_SIGMA_M**2))
-    target, known = places.targets(state.vertices[large])
-    large, target = large[known], target[known]
-    pull = np.linalg.norm(state.vertices[large] - target, axis=1)
-    weight = 0.25 / FREE_SIGMA_M**2 * geman_mcclure_weight(pull, 0.3)
-    sideways = [
-        Pairs(large, np.tile(axis, (len(large), 1)), target, weight) for axis in np.eye(2, 3)]
-    return join_pairs([along, *sideways])
+    vertices = state.vertices
+    along, large = gaps_along_rays(
+        vertices, visibility.sight, visibility.gap_m, SMALL_GAP_M, 0.5 / FREE_SIGMA_M**2)
+    target, known = places.targets(vertices[large])
+    sideways = pulls_aside(
+        vertices, large[known], target[known], 0.25 / FREE_SIGMA_M**2, PULL_SCALE_M)
+    return join_pairs([Pairs(*along), Pairs(*sideways)])
 
 
 def depth_energy(

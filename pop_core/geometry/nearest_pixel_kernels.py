@@ -53,18 +53,3 @@ def nearest_pixel(row, y, x, reach):
                     best, best_y, best_x = float(d), row[y, column], column
         aside += 1
     return best, best_y, best_x
-
-
-@njit(cache=True, nogil=True)
-def nearest_pixels(row, uv):
-    """Return the pixel (u, v) of a mask nearest to each pixel (n,2), (-1, -1) where none is.
-
-    Args:
-        row: What `nearest_rows` returned.
-        uv: Pixels of the image.
-    """
-    farthest = float(row.shape[0] + row.shape[1])
-    out = np.empty((uv.shape[0], 2), dtype=np.int64)
-    for i in range(uv.shape[0]):
-        _, out[i, 1], out[i, 0] = nearest_pixel(row, uv[i, 1], uv[i, 0], farthest)
-    return out

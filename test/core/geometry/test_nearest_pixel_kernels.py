@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from pop_core.geometry.nearest_pixel_kernels import nearest_pixel, nearest_pixels, nearest_rows
+from pop_core.geometry.nearest_pixel_kernels import nearest_pixel, nearest_rows
 
 SHAPE = (30, 40)
 
@@ -13,14 +13,17 @@ def test_the_nearest_pixel_is_that_of_a_search_through_all(share: float) -> None
     v, u = np.nonzero(mask)
     uv = rng.integers(0, [SHAPE[1], SHAPE[0]], (100, 2))
     squared = (u - uv[:, :1]) ** 2 + (v - uv[:, 1:]) ** 2
-    found = nearest_pixels(nearest_rows(mask), uv)
-    assert mask[found[:, 1], found[:, 0]].all()
-    np.testing.assert_array_equal(np.square(found - uv).sum(axis=1), squared.min(axis=1))
+    row = nearest_rows(mask)
+    found = np.array([nearest_pixel(row, y, x, 70.0) for x, y in uv]).astype(int)
+    assert mask[found[:, 1], found[:, 2]].all()
+    np.testing.assert_array_equal(found[:, 0], squared.min(axis=1))
+    np.testing.assert_array_equal(
+        np.square(found[:, :0:-1] - uv).sum(axis=1), squared.min(axis=1))
 
 
 def test_nothing_is_nearest_in_an_empty_mask() -> None:
     row = nearest_rows(np.zeros(SHAPE, dtype=bool))
-    np.testing.assert_array_equal(nearest_pixels(row, np.array([[3, 4]])), [[-1, -1]])
+    assert nearest_pixel(row, 4, 3, 70.0)[1:] == (-1, -1)
 
 
 def test_what_is_out_of_reach_is_not_found() -> None:
