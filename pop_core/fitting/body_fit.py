@@ -103,6 +103,7 @@ class BodyFitter:
         for hypothesis in hypotheses:
             self.steps.fit_surface(hypothesis, observation, LATE_SCALES_M, free_space=True)
         segment = self._compare(hypotheses, observation, unclaimed)
+        observation = replace(observation, standing_clear=unclaimed.found)
         for _ in range(self.config.limb_searches):
             found = self._with_limbs_found(hypotheses, started, observation, segment)
             kept = _best([*hypotheses, *found], len(hypotheses))

@@ -29,7 +29,7 @@ from pop_core.fitting.depth_consistency import (
 )
 from pop_core.fitting.energy import BodyEnergy, PriorBelief, TermWeights
 from pop_core.fitting.fitting_config import FittingConfig
-from pop_core.fitting.ground_contact import ground_pairs
+from pop_core.fitting.ground_contact import ground_pairs, measured_feet
 from pop_core.fitting.levenberg_marquardt import FIRST_DAMPING, cost_of, levenberg_marquardt_step
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import Pairs, join_pairs, merged_pairs
@@ -120,7 +120,8 @@ class HypothesisSteps:
             floor = None
             if observation.ground is not None:
                 floor = ground_pairs(
-                    hypothesis.state, observation.ground, observation.lifted, Power.COMPARED)
+                    hypothesis.state, observation.ground, observation.lifted, Power.COMPARED,
+                    measured_feet(hypothesis.state, observation))
             energy = BodyEnergy(
                 hypothesis.state, observation, hypothesis.belief, self.weights(), floor,
                 power=Power.COMPARED)
@@ -189,7 +190,9 @@ class HypothesisSteps:
     ) -> None:
         every = list(pairs)
         if observation.ground is not None:
-            every.append(ground_pairs(hypothesis.state, observation.ground, observation.lifted))
+            every.append(ground_pairs(
+                hypothesis.state, observation.ground, observation.lifted,
+                measured=measured_feet(hypothesis.state, observation)))
         energy = BodyEnergy(
             hypothesis.state, observation, hypothesis.belief, weights,
             join_pairs(every) if every else None)

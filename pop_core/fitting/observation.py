@@ -80,6 +80,8 @@ class Observation:
         keypoint_rays: Rays of the keypoints that were not lifted.
         ground: The floor, or None when none is seen.
         noise: Noise of the measured depth.
+        standing_clear: Surface of limbs that was found beside the first bodies fitted; None
+            before it was looked for.
     """
 
     window: Window
@@ -92,6 +94,7 @@ class Observation:
     keypoint_rays: KeypointRays
     ground: Ground | None
     noise: DepthNoise = USUAL_NOISE
+    standing_clear: Bool[np.ndarray, 'h w'] | None = None
 
     def points(self, mask: Bool[np.ndarray, 'h w']) -> Float[np.ndarray, 'n 3']:
         """Return the measured points of a mask [m], camera frame, in row order."""

@@ -32,7 +32,10 @@ REACH_M = {
 
 
 class UnclaimedSurface:
-    """What hangs together with the lifted bones of one observation."""
+    """What hangs together with the lifted bones of one observation.
+
+    `found` holds every piece that was ever left out, None before the first.
+    """
 
     def __init__(self, observation: Observation) -> None:
         """Hold an observation; nothing is computed until a hypothesis leaves something out."""
@@ -40,9 +43,10 @@ class UnclaimedSurface:
         self._bones = _BonePixels.of(observation)
         self._person: Bool[np.ndarray, 'h w'] | None = None
         self._with_flats = self._reached(observation.own)
+        self.found: Bool[np.ndarray, 'h w'] | None = None
 
     def pieces(self, claimed: Bool[np.ndarray, 'h w']) -> Bool[np.ndarray, 'h w']:
-        """Return the pieces as large as limbs that hypotheses leave unexplained.
+        """Return the pieces as large as limbs that hypotheses leave out, and remember them.
 
         Args:
             claimed: Pixels that some hypothesis explains.
@@ -52,7 +56,10 @@ class UnclaimedSurface:
             return out
         if self._person is None:
             self._person = self._reached(self.observation.own & ~self._flats())
-        return self._limb_sized(self._person & ~claimed, LARGEST_M2)
+        out = self._limb_sized(self._person & ~claimed, LARGEST_M2)
+        if out.any():
+            self.found = out if self.found is None else self.found | out
+        return out
 
     def _reached(self, allowed: Bool[np.ndarray, 'h w']) -> Bool[np.ndarray, 'h w']:
         """Return the allowed pixels that hang together with bones, within a person's reach."""
