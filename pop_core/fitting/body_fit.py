@@ -207,7 +207,7 @@ class BodyFitter:
         energies = {
             'E_J3D': cost_of(blocks[:1]), 'E_prior': cost_of(blocks[PRIOR_BLOCKS]),
             'E_NN': cost_of(blocks[PAIR_BLOCKS]) + spread,
-            'E_depth': depth_energy(visibility.rendered, observation, segment),
+            'E_depth': depth_energy(visibility.rendered.depth_m, observation, segment),
         }
         return BodyFit(
             coarse.parameters, assemble(blocks, self.coarse.size).hessian, visibility, coarse,

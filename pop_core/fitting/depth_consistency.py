@@ -7,6 +7,7 @@ something farther it contradicts the measurement and is pushed to where it can h
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -24,7 +25,7 @@ from pop_core.fitting.observation import Observation
 from pop_core.fitting.residuals import Pairs, join_pairs
 from pop_core.fitting.sight_kernels import mean_misfit, see
 from pop_core.geometry.nearest_pixel_kernels import nearest_rows
-from pop_core.rendering.depth_renderer import RenderedDepth, render_depth
+from pop_core.rendering.depth_renderer import RenderedDepth, render_alike, render_depth
 
 SELF_TOLERANCE_M = 0.03  # z-buffer against vertex: a triangle's own slope
 CLOTHES_M = 0.03  # measured skin is cloth: it lies this far in front of the body at most
@@ -70,6 +71,20 @@ def render_body(state: BodyState, observation: Observation) -> RenderedDepth:
     """Return a body as the camera of an observation would see it alone."""
     body = state.body
     return render_depth(state.vertices, body.faces, observation.camera, closed=body.is_closed)
+
+
+def render_bodies(
+    states: Sequence[BodyState], observation: Observation
+) -> Float32[np.ndarray, 'k h w']:
+    """Return the depth of each of several bodies of one mesh as the camera would see it alone [m].
+
+    Trials of a limb share the rest of the body, which is then drawn once.
+    """
+    body = states[0].body if states else None
+    return render_alike(
+        [state.vertices for state in states],
+        body.faces if body else np.zeros((0, 3), dtype=np.int64), observation.camera,
+        closed=body.is_closed if body else False)
 
 
 def see_body(state: BodyState, observation: Observation) -> Visibility:
@@ -137,7 +152,7 @@ def free_space_pairs(
 
 
 def depth_energy(
-    rendered: RenderedDepth,
+    body_m: Float32[np.ndarray, 'h w'],
     observation: Observation,
     segment: Bool[np.ndarray, 'h w'],
     limit_m: float = DEPTH_LIMIT_M,
@@ -149,12 +164,12 @@ def depth_energy(
     measured depth costs its gap; a body behind the scene costs nothing.
 
     Args:
-        rendered: D_body.
+        body_m: D_body, +inf where there is none.
         observation: D_in.
         segment: The person's pixels, the same for every hypothesis that is compared.
         limit_m: Truncation of a pixel's cost [m].
     """
-    return float(mean_misfit(rendered.depth_m, observation.depth_m, segment, limit_m))
+    return float(mean_misfit(body_m, observation.depth_m, segment, limit_m))
 
 
 def free_space_violation(

@@ -88,4 +88,4 @@ class TracedSteps(HypothesisSteps):
         joints = cost_of(energy.terms(state, False)[:1])
         rendered = render_body(state, observation)
         segment = self.segment(rendered, observation)
-        return joints, depth_energy(rendered, observation, segment)
+        return joints, depth_energy(rendered.depth_m, observation, segment)

@@ -24,6 +24,7 @@ from pop_core.fitting.depth_consistency import (
     Visibility,
     depth_energy,
     free_space_pairs,
+    render_bodies,
     render_body,
     see_body,
 )
@@ -116,7 +117,8 @@ class HypothesisSteps:
         segment: Bool[np.ndarray, 'h w'],
     ) -> None:
         """Set each hypothesis's cost: E_depth on common pixels, keypoints and priors beside it."""
-        for hypothesis in hypotheses:
+        bodies_m = render_bodies([hypothesis.state for hypothesis in hypotheses], observation)
+        for hypothesis, body_m in zip(hypotheses, bodies_m, strict=True):
             floor = None
             if observation.ground is not None:
                 floor = ground_pairs(
@@ -125,9 +127,7 @@ class HypothesisSteps:
             energy = BodyEnergy(
                 hypothesis.state, observation, hypothesis.belief, self.weights(), floor,
                 power=Power.COMPARED)
-            rendered = render_body(hypothesis.state, observation)
-            depth = depth_energy(rendered, observation, segment)
-            hypothesis.cost = DEPTH_SCORE * depth + cost_of(
+            hypothesis.cost = DEPTH_SCORE * depth_energy(body_m, observation, segment) + cost_of(
                 energy.terms(hypothesis.state, False))
 
     def common_segment(

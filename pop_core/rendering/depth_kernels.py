@@ -94,6 +94,36 @@ def rasterize_parts(vertices, faces, part, fx, fy, cx, cy, closed, depth):
 
 
 @njit(cache=True, nogil=True)
+def rasterize_alike(vertices, faces, fx, fy, cx, cy, closed, depth):
+    """Draw versions of a mesh (k,n,3) into depth (k,h,w, zeros; +inf = nothing).
+
+    What all versions have in common is drawn once.
+    """
+    k, n = vertices.shape[:2]
+    differs = np.zeros(n, dtype=np.bool_)
+    for m in range(1, k):
+        for i in range(n):
+            for c in range(3):
+                if vertices[m, i, c] != vertices[0, i, c]:
+                    differs[i] = True
+    face_id = np.empty(depth.shape[1:], dtype=np.int32)
+    u, v, inverse = _seen(vertices[0], fx, fy, cx, cy)
+    for t in range(faces.shape[0]):
+        a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+        if not (differs[a] or differs[b] or differs[c]):
+            _draw(t, a, b, c, u, v, inverse, closed, depth[0], face_id)
+    for m in range(1, k):
+        depth[m] = depth[0]
+    for m in range(k):
+        u, v, inverse = _seen(vertices[m], fx, fy, cx, cy)
+        for t in range(faces.shape[0]):
+            a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
+            if differs[a] or differs[b] or differs[c]:
+                _draw(t, a, b, c, u, v, inverse, closed, depth[m], face_id)
+        _invert(depth[m])
+
+
+@njit(cache=True, nogil=True)
 def area_normals(vertices, faces, out):
     """Fill unit normals (n,3) of vertices, weighted by the area of their triangles."""
     out[:] = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,6 +53,28 @@ def render_depth(
         camera.fx, camera.fy, camera.cx, camera.cy, closed, depth_m, face,
     )
     return RenderedDepth(depth_m, face)
+
+
+def render_alike(
+    vertices_camera: Sequence[Float[np.ndarray, 'n 3']], f: Int[np.ndarray, 'm 3'],
+    camera: Camera, *, closed: bool = False,
+) -> Float32[np.ndarray, 'k h w']:
+    """Return the z-buffers of versions of a mesh [m]; +inf where one is not seen.
+
+    The fewer vertices differ between them, the less each of them takes.
+
+    Args:
+        vertices_camera: Vertices of each version.
+        f: Triangles of all of them.
+        camera: The pinhole.
+        closed: As in `render_depth`.
+    """
+    depth_m = np.zeros((len(vertices_camera), camera.height, camera.width), dtype=np.float32)
+    if len(vertices_camera):
+        depth_kernels.rasterize_alike(
+            np.stack(vertices_camera), np.ascontiguousarray(f, dtype=np.int64),
+            camera.fx, camera.fy, camera.cx, camera.cy, closed, depth_m)
+    return depth_m
 
 
 def render_parts(

@@ -186,7 +186,7 @@ class WarmStart:
         energies = {
             'E_J3D': cost_of(blocks[:1]), 'E_prior': cost_of(blocks[PRIOR_BLOCKS]),
             'E_NN': cost_of(blocks[PAIR_BLOCKS]) + surface.spread,
-            'E_depth': depth_energy(visibility.rendered, observation, segment),
+            'E_depth': depth_energy(visibility.rendered.depth_m, observation, segment),
         }
         return WarmFit(
             state, visibility, segment, surface.of_limb, prediction.information, curvature,

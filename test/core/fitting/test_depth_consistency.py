@@ -43,7 +43,7 @@ def test_the_true_body_contradicts_nothing(body: BodyModel, person: BodyParamete
     assert (sight == Sight.CONTRADICTED).mean() < 0.1
     assert (sight == Sight.VISIBLE).mean() > 0.3
     segment = body_pixels(body, person, observation)
-    assert depth_energy(visibility.rendered, observation, segment) < 0.01
+    assert depth_energy(visibility.rendered.depth_m, observation, segment) < 0.01
 
 
 def test_something_in_front_hides_and_costs_nothing(
@@ -60,7 +60,7 @@ def test_something_in_front_hides_and_costs_nothing(
     assert below.any()
     assert hidden[below].all()
     segment = (observation.depth_m > 1.6) & (observation.depth_m < 3.5)
-    assert depth_energy(visibility.rendered, observation, segment) < 0.01
+    assert depth_energy(visibility.rendered.depth_m, observation, segment) < 0.01
 
 
 def test_an_arm_in_the_open_is_pulled_to_the_body(
@@ -94,7 +94,7 @@ def test_energy_and_violation_grow_when_the_body_steps_forward(
     for step_m in (0.0, 0.06, 0.12):
         nearer = person.replaced(transl=person.transl - [0, 0, step_m])
         visibility = see_body(FitBody(body, full=False).state(nearer), observation)
-        energies.append(depth_energy(visibility.rendered, observation, segment))
+        energies.append(depth_energy(visibility.rendered.depth_m, observation, segment))
         violations.append(free_space_violation(visibility.rendered, observation.depth_m))
     assert energies == sorted(energies)
     # Its gap, plus the rim: a nearer body is larger in the image, and there the gap is cut off.

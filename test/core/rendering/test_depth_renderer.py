@@ -7,6 +7,7 @@ from pop_core.fitting.body_state import FitBody
 from pop_core.geometry.camera import Camera
 from pop_core.rendering.depth_renderer import (
     is_closed,
+    render_alike,
     render_depth,
     render_parts,
     vertex_normals,
@@ -80,6 +81,24 @@ def test_parts_are_seen_as_each_alone() -> None:
         for k in range(3):
             alone = render_depth(state.vertices, faces[part == k], CAMERA, closed=closed)
             np.testing.assert_array_equal(together[k], alone.depth_m)
+
+
+@pytest.mark.parametrize('closed', [True, False])
+def test_versions_of_a_body_are_seen_as_each_alone(closed: bool) -> None:
+    person = facing_person(np.zeros(10))
+    body = FitBody(default_body(), full=False)
+    poses = [person.body_pose.copy() for _ in range(3)]
+    poses[1][15, 2], poses[2][17, 1] = 0.8, 1.0  # a shoulder and an elbow
+    states = [body.state(person.replaced(body_pose=pose)) for pose in poses]
+    alike = (states[0].vertices == states[1].vertices).all(axis=1)
+    assert 0.5 < alike.mean() < 1.0
+    far = body.state(person.replaced(transl=person.transl + 0.3))
+    for versions in (states, [*states, far], states[:1]):
+        drawn = render_alike([s.vertices for s in versions], body.faces, CAMERA, closed=closed)
+        for depth_m, state in zip(drawn, versions, strict=True):
+            alone = render_depth(state.vertices, body.faces, CAMERA, closed=closed)
+            np.testing.assert_array_equal(depth_m, alone.depth_m)
+    assert render_alike([], body.faces, CAMERA).shape == (0, CAMERA.height, CAMERA.width)
 
 
 def test_normals_of_a_cube_point_along_its_diagonals() -> None:
