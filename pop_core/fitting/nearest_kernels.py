@@ -53,14 +53,13 @@ def _grid(places):
 
 
 @njit(cache=True, nogil=True, inline='always')  # the call would cost as much as its loop
-def _nearest_of(begin, end, order, places, x, y, z, best, found):
-    """Return squared distance and index of the nearest so far, some cells of a row looked at."""
+def _nearest_of(begin, end, places, x, y, z, best, found):
+    """Return squared distance and row of the nearest so far, some cells of a row looked at."""
     for k in range(begin, end):
-        j = order[k]
-        dx, dy, dz = places[j, 0] - x, places[j, 1] - y, places[j, 2] - z
+        dx, dy, dz = places[k, 0] - x, places[k, 1] - y, places[k, 2] - z
         d = dx * dx + dy * dy + dz * dz
         if d < best:
-            best, found = d, j
+            best, found = d, k
     return best, found
 
 
@@ -71,6 +70,7 @@ def nearest(points, places):
     All must be finite, and at least one place be given.
     """
     x0, y0, cell, columns, rows, first, order = _grid(places)
+    places = places[order]  # those of a cell beside each other
     index = np.empty(points.shape[0], dtype=np.int64)
     distance = np.empty(points.shape[0])
     for i in range(points.shape[0]):
@@ -84,20 +84,23 @@ def nearest(points, places):
         while ring <= last and best > ((ring - 1) * cell) ** 2:
             left, right = column - ring, column + ring
             for r in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
+                away = max(y0 + r * cell - y, y - y0 - (r + 1) * cell, 0.0)
+                if away * away >= best:
+                    continue
                 start = r * columns
                 if abs(r - row) == ring:
                     best, found = _nearest_of(
                         first[start + max(left, 0)], first[start + min(right, columns - 1) + 1],
-                        order, places, x, y, z, best, found)
+                        places, x, y, z, best, found)
                     continue
                 if left >= 0:
                     best, found = _nearest_of(
-                        first[start + left], first[start + left + 1], order, places, x, y, z,
-                        best, found)
+                        first[start + left], first[start + left + 1], places, x, y, z, best,
+                        found)
                 if right < columns:
                     best, found = _nearest_of(
-                        first[start + right], first[start + right + 1], order, places, x, y, z,
-                        best, found)
+                        first[start + right], first[start + right + 1], places, x, y, z, best,
+                        found)
             ring += 1
-        index[i], distance[i] = found, np.sqrt(best)
+        index[i], distance[i] = order[found], np.sqrt(best)
     return index, distance
