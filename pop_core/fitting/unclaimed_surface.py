@@ -25,6 +25,7 @@ NEAR_M, ALONG_M = 0.15, 0.3  # surface this near to a bone, along the ray, may b
 NAMED_SHARE = 0.3  # a flat surface that bones cover to less than this is no person's
 STEP_M, STEP_SIGMAS = 0.025, 2.0  # of depth between neighbouring pixels of one surface
 SMALLEST_M2, LARGEST_M2 = 0.003, 0.2  # of a limb or what is seen of it
+MOST_M2 = 0.3  # where more is left out, the surface went on to a soft seat, say
 # How far a person reaches from joints of the trunk [m].
 REACH_M = {
     'left_shoulder': 0.75, 'right_shoulder': 0.75, 'neck': 0.8,
@@ -41,6 +42,7 @@ class UnclaimedSurface:
         """Hold an observation; nothing is computed until a hypothesis leaves something out."""
         self.observation = observation
         self._bones = _BonePixels.of(observation)
+        self._pixel_m2 = (np.nan_to_num(observation.depth_m) / observation.camera.fx) ** 2
         self._person: Bool[np.ndarray, 'h w'] | None = None
         self._with_flats = self._reached(observation.own)
         self.found: Bool[np.ndarray, 'h w'] | None = None
@@ -56,7 +58,10 @@ class UnclaimedSurface:
             return out
         if self._person is None:
             self._person = self._reached(self.observation.own & ~self._flats())
-        out = self._limb_sized(self._person & ~claimed, LARGEST_M2)
+        left_out = self._person & ~claimed
+        if self._pixel_m2[left_out].sum() > MOST_M2:
+            return np.zeros_like(claimed)
+        out = self._limb_sized(left_out, LARGEST_M2)
         if out.any():
             self.found = out if self.found is None else self.found | out
         return out
@@ -97,9 +102,7 @@ class UnclaimedSurface:
         opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
         count, number = cv2.connectedComponents(opened, connectivity=4)
         rows = opened > 0
-        area_m2 = np.bincount(
-            number[rows], minlength=count,
-            weights=(self.observation.depth_m[rows] / self.observation.camera.fx) ** 2)
+        area_m2 = np.bincount(number[rows], weights=self._pixel_m2[rows], minlength=count)
         fits = (area_m2 > SMALLEST_M2) & (area_m2 < largest_m2)
         return np.asarray(fits[number])
 

@@ -13,7 +13,7 @@ from pop_core.fitting.depth_consistency import render_body
 from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.fitting.hypotheses import HypothesisSteps
 from pop_core.fitting.observation import Observation, observe
-from pop_core.fitting.unclaimed_surface import LARGEST_M2, UnclaimedSurface
+from pop_core.fitting.unclaimed_surface import LARGEST_M2, MOST_M2, UnclaimedSurface
 from pop_core.rgbd import RgbdFrame
 from pop_core.segmentation.body_segmentation import SegmentationConfig
 
@@ -74,6 +74,22 @@ def test_a_wall_that_a_person_leans_on_is_nobodys(
     wall = observation.depth_m >= wall_m
     assert found.any()
     assert not (found & wall).any()
+
+
+def test_many_pieces_together_are_something_else(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    """Surface that goes on from a sitter to a soft seat is left out piece by piece."""
+    observation = seen(body, person, photograph(body, person))
+    whole = claimed(body, person, observation)
+    row = np.flatnonzero(whole.any(axis=1))
+    bands = (np.arange(len(whole)) - row[0]) % 8 < 6
+    pixel_m2 = (observation.depth_m / observation.camera.fx) ** 2
+    assert pixel_m2[whole & bands[:, None]].sum() > MOST_M2
+    surface = UnclaimedSurface(observation)
+    assert not surface.pieces(whole & ~bands[:, None]).any()
+    two = bands & (np.arange(len(whole)) < row[0] + 16)
+    assert surface.pieces(whole & ~two[:, None]).any()
 
 
 def test_more_than_a_limb_is_something_else(body: BodyModel, person: BodyParameters) -> None:
