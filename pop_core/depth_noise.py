@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float, Float32
 
 LAG_PX = 6  # further apart than the spots of noise that stereo makes are wide
-STEP_PX = 5  # every so many pixels are enough
+STEP_PX = 3  # every so many pixels are enough
 LEAST_SAMPLES = 200
 BASE_M = 0.0012  # no sensor is better than this at any distance
 MAD_TO_SIGMA = 1.4826

@@ -184,6 +184,18 @@ def test_a_fit_is_ready_for_whole_frames_only_and_for_its_owner_only(
     assert not fits.is_busy
 
 
+def test_a_fit_that_is_put_off_is_there_in_the_next_frame(
+    stage: Stage, late: Late, person: BodyParameters
+) -> None:
+    fits = asked(stage, late, person, track=3)
+    late.finish()
+    assert fits.poll()
+    fits.put_off()
+    assert fits.take(3) is None
+    assert fits.poll()
+    assert fits.take(3) is not None
+
+
 def test_a_fit_of_a_track_that_has_ended_keeps_nobody_waiting(
     stage: Stage, late: Late, person: BodyParameters
 ) -> None:

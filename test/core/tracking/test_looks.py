@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.late import Late
 from support.one_person import CAMERA, lift_truth
 from support.stage import Stage, only
 
@@ -57,9 +58,9 @@ def slow() -> Slow:
     return Slow()
 
 
-def watched(body: BodyModel, slow: Slow) -> Stage:
+def watched(body: BodyModel, slow: Slow, finding: Late | None = None) -> Stage:
     """Return a stage that somebody slow looks at."""
-    made = Stage(body, OFTEN, lookout=slow)
+    made = Stage(body, OFTEN, finding, lookout=slow)
     slow.watcher = made.tracker.pipeline
     return made
 
@@ -178,6 +179,27 @@ def test_without_help_every_look_is_waited_for(stage: Stage) -> None:
     assert look is not None
     assert look.frame is frame
     assert not looks.is_busy
+
+
+def test_a_body_found_anew_is_compared_once_a_look_has_come_in(
+    body: BodyModel, slow: Slow, late: Late, person: BodyParameters
+) -> None:
+    slow.is_at_once = True
+    stage = watched(body, slow, finding=late)
+    late.pipeline = stage.tracker.pipeline
+    stage.show(person, times=5)
+    away = person.replaced(transl=person.transl + [-0.75, 0.0, 0.0])  # where nobody can run to
+    stage.show(away, times=3)
+    slow.is_at_once = False
+    stage.show(away, times=2)
+    assert (late.asked, len(slow.waiting)) == (1, 1)
+    late.finish()
+    fresh = stage.tracker._fresh
+    stage.show(away, times=2)
+    assert fresh.is_busy  # it waits, and nobody for it
+    slow.finish()
+    assert off_m(stage, away) < NEAR_M
+    assert not fresh.is_busy
 
 
 def test_no_look_is_due_while_one_is_made() -> None:
