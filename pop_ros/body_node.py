@@ -35,7 +35,7 @@ from pop_ros.tf_messages import tf2_msgs
 POLL_S = 0.05
 FOLLOW_S = 0.25
 REPORT_S = 1.0
-STOP_S = 5.0  # patience at shutdown with the frame in work and the look for people
+STOP_S = 5.0  # patience at shutdown with the frame in work
 
 
 class PopNode(LifecycleNode):
@@ -149,8 +149,7 @@ class PopNode(LifecycleNode):
         self._inputs.leave()
         if self.stop():
             return TransitionCallbackReturn.SUCCESS
-        self.log.error(
-            f'the frame in work did not end within {STOP_S:.0f} s')
+        self.log.error(f'the frame in work did not end within {STOP_S:.0f} s')
         return TransitionCallbackReturn.ERROR
 
     # Services and parameters

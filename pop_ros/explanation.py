@@ -66,7 +66,7 @@ def explain_missing_pairs(
 def explain_missing_keypoints(seconds: float) -> str:
     """Return what it means that the keypoint source has not answered for some seconds."""
     return (f'the keypoint source has not answered for {seconds:.0f} s: nobody new is found, and '
-            'who is followed is followed without it; if it goes on, start the node anew')
+            'who is followed is followed without it; after 30 s its process is started anew')
 
 
 def explain_refused_pairs(pairer: FramePairer[ItemT]) -> str:

@@ -122,7 +122,7 @@ class FrameWork:
     def _prepare(self, frames: StaticFrames) -> None:
         started_s = time.monotonic()
         self._looking.configure(self._settings.pipeline_config)
-        self._looking.start()
+        source = self._looking.start()
         self._log.info(
             'preparing; the first start generates the pose library and compiles kernels, later '
             'ones read them from the cache')
@@ -132,6 +132,7 @@ class FrameWork:
             looking=self._looking, searching=self._searching)
         self._outputs.publish_model(fitter.model)
         self._configure_finding()
+        source.result()
         self._fitter = fitter
         self.doing = ''
         self._log.info(f'ready after {time.monotonic() - started_s:.1f} s')

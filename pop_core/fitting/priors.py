@@ -23,6 +23,7 @@ from pop_core.retrieval.candidate import PoseCandidate
 from pop_core.retrieval.pose_prior import PosePrior
 
 SCALE_SIGMA = 0.04  # log scale; the betas hold adults, scale is for children and giants
+SMALLEST_SCALE = 1e-300  # has a logarithm
 SCALE_TAIL = 2.5  # in sigmas: beyond it a small body is a child, not an unlikely adult
 LIMIT_SIGMA_RAD = 0.05
 
@@ -83,12 +84,17 @@ def conditional_prior_term(
     return Quadratic(cost, gradient, hessian, BODY_POSE.start)
 
 
+def _log_scale(state: BodyState) -> float:
+    """Return the log scale; of a body that a step shrank to nothing, a very small one."""
+    return math.log(max(state.parameters.scale, SMALLEST_SCALE))
+
+
 def scale_weight(state: BodyState, power: Power) -> float:
     """Return the robust weight of the scale prior: adults vary little, children much.
 
     It is robust to the small side only: there are children, but no giants.
     """
-    deviation = max(-math.log(state.parameters.scale), 0.0) / SCALE_SIGMA
+    deviation = max(-_log_scale(state), 0.0) / SCALE_SIGMA
     return float(geman_mcclure(deviation**2, SCALE_TAIL, int(power)))
 
 
@@ -101,7 +107,7 @@ def shape_prior_term(state: BodyState, of_scale: float) -> Quadratic:
     """
     parameters = state.parameters
     weight = of_scale / SCALE_SIGMA**2
-    log_scale = math.log(parameters.scale)
+    log_scale = _log_scale(state)
     pull = np.empty(len(parameters.betas) + 1)
     pull[:-1], pull[-1] = parameters.betas, weight * log_scale
     hessian = np.eye(len(pull))

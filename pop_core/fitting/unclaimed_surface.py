@@ -39,7 +39,7 @@ class UnclaimedSurface:
     """
 
     def __init__(self, observation: Observation) -> None:
-        """Hold an observation; nothing is computed until a hypothesis leaves something out."""
+        """Find what hangs together with the lifted bones of an observation."""
         self.observation = observation
         self._bones = _BonePixels.of(observation)
         self._pixel_m2 = (np.nan_to_num(observation.depth_m) / observation.camera.fx) ** 2

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.faults import fail_in_two_parts, take_for_ever
 from support.lost_limb import lost_limbs, raised
 from support.node import ROOT
 from support.one_person import facing_person
@@ -112,6 +113,59 @@ def test_a_process_that_hangs_is_ended_and_replaced(
     assert not is_running(hung)
     # The first answer of its successor may take as long as loading does.
     assert finding.submit(find_person, *seen).result(WAIT_S).status is EstimateStatus.OK
+
+
+def test_a_process_that_hangs_again_is_ended_as_soon_as_the_first_time(
+    finding: FindingProcess, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    finding.start().result(WAIT_S)
+    monkeypatch.setattr(finding_process, 'PATIENCE_S', 0.5)
+    for _ in range(2):
+        hung = finding.submit(take_for_ever)
+        with pytest.raises(FindingError, match='ended with code -9 after 0'):
+            hung.result(WAIT_S)
+
+
+def test_what_waits_for_a_process_that_is_stopped_fails_by_name(finding: FindingProcess) -> None:
+    finding.start().result(WAIT_S)
+    asked = [finding.submit(take_for_ever) for _ in range(3)]
+    while finding.busy_s == 0.0:
+        time.sleep(0.01)
+    finding.stop()
+    for future in (*asked, finding.submit(take_for_ever)):
+        with pytest.raises(FindingError, match=r'was stopped|ended with code -9'):
+            future.result(WAIT_S)
+
+
+def test_an_error_that_cannot_be_sent_arrives_by_its_name_and_words(
+    finding: FindingProcess
+) -> None:
+    finding.start().result(WAIT_S)
+    pid = child_of(finding)
+    with pytest.raises(FindingError, match='TwoPartsError: of this and that'):
+        finding.submit(fail_in_two_parts).result(WAIT_S)
+    assert child_of(finding) == pid
+
+
+def test_nothing_is_left_of_a_node_that_was_killed_while_its_process_works(
+    tmp_path: Path
+) -> None:
+    code = (f'import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / "test")!r}]; '
+            'from support.faults import take_for_ever; '
+            'from pop_ros.finding_process import FindingProcess; f = FindingProcess(); '
+            'f.start().result(); f.submit(take_for_ever); '
+            'print(f._process.pid, flush=True); import time; time.sleep(60)')
+    node = subprocess.Popen(
+        [sys.executable, '-c', code], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+        text=True, cwd=tmp_path)
+    assert node.stdout is not None
+    pid = int(node.stdout.readline())
+    node.kill()
+    node.wait(30)
+    end_s = time.monotonic() + 30
+    while is_running(pid) and time.monotonic() < end_s:
+        time.sleep(0.1)
+    assert not is_running(pid)
 
 
 def test_half_an_answer_is_not_taken_for_a_part_of_the_next(

@@ -64,7 +64,6 @@ def test_weighted_normal_equations_are_those_of_the_textbook() -> None:
     equations = assemble([Residual(r[:5], J[:5], w[:5]), Residual(r[5:], J[5:], w[5:])], 4)
     np.testing.assert_allclose(equations.hessian, J.T @ np.diag(w) @ J, atol=1e-12)
     np.testing.assert_allclose(equations.gradient, J.T @ (w * r), atol=1e-12)
-    np.testing.assert_allclose(equations.gradient, J.T @ (w * r), atol=1e-12)
     np.testing.assert_array_equal(equations.hessian, equations.hessian.T)
 
 

@@ -157,3 +157,11 @@ def test_joint_term_vanishes_at_the_lifted_joints(
     state = FitBody(body, full=False).state(person)
     r = joint_residual(state, exact, np.ones(15), jacobian=False).r
     np.testing.assert_allclose(r, 0, atol=1e-8)
+
+
+def test_a_body_that_a_step_shrank_to_nothing_costs_much_and_nothing_fails(
+    state: BodyState
+) -> None:
+    none = state.body.state(state.parameters.replaced(scale=0.0))
+    assert 1e6 < shape_prior_term(none, 1.0).cost < np.inf
+    assert np.isfinite(scale_weight(none, Power.STEP))
