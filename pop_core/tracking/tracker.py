@@ -19,6 +19,7 @@ from pop_core.tracking.association import Expected, associate, behind_others
 from pop_core.tracking.background import Background
 from pop_core.tracking.body_filter import first_state
 from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, Gap
+from pop_core.tracking.doubles import doubles
 from pop_core.tracking.doubts import (
     STALE_S,
     count_misses,
@@ -199,7 +200,10 @@ class BodyTracker:
                 if estimate is not None:
                     bodies.append(estimate)
                     scene = replace(scene, taken=scene.taken | estimate.mask)
-        self._tracks = [t for t in self._tracks if not t.has_ended(self.config)]
+        double = doubles(bodies)
+        bodies = [body for body in bodies if body.track is None or body.track.id not in double]
+        self._tracks = [
+            t for t in self._tracks if t.id not in double and not t.has_ended(self.config)]
         known = {track.id for track in self._tracks}
         self._fresh.forget_unless(known)
         self._late_limbs.forget_unless(known)
