@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from pop_core.body.skinning_kernels import forward_kinematics
-from pop_core.geometry.rotation_kernels import rotation_matrices, rotation_vectors
+from pop_core.geometry.rotation_kernels import products, rotation_matrices, rotation_vectors
 
 
 @njit(cache=True, nogil=True)
@@ -27,11 +27,4 @@ def pose_tree(global_orient, body_pose, betas, joint_template, joint_shapedirs, 
 @njit(cache=True, nogil=True)
 def turned(increments, R_local):
     """Return rotation vectors (j,3) [rad] of exp(increment) R per joint."""
-    turn = rotation_matrices(increments)
-    out = np.zeros(R_local.shape)
-    for j in range(R_local.shape[0]):
-        for r in range(3):
-            for c in range(3):
-                for k in range(3):
-                    out[j, r, c] += turn[j, r, k] * R_local[j, k, c]
-    return rotation_vectors(out)
+    return rotation_vectors(products(rotation_matrices(increments), R_local))

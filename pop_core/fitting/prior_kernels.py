@@ -7,6 +7,7 @@ from numba import njit
 
 from pop_core.geometry.rotation_kernels import (
     left_jacobian_inverse,
+    products,
     rotation_matrices,
     rotation_vectors,
 )
@@ -30,14 +31,7 @@ def _model(r, J, weight):
 @njit(cache=True, nogil=True)
 def turns(R, pose, sigma):
     """Return rotation vectors (j,3) [rad] from poses (j,3) [rad] to R (j,3,3), over sigma (j)."""
-    there = rotation_matrices(pose)
-    relative = np.zeros(R.shape)
-    for j in range(R.shape[0]):
-        for a in range(3):
-            for b in range(3):
-                for k in range(3):
-                    relative[j, a, b] += R[j, a, k] * there[j, b, k]
-    out = rotation_vectors(relative)
+    out = rotation_vectors(products(R, rotation_matrices(pose).transpose(0, 2, 1)))
     for j in range(R.shape[0]):
         out[j] /= sigma[j]
     return out

@@ -26,6 +26,18 @@ def rotation_matrices(rotvecs):
 
 
 @njit(cache=True, nogil=True)
+def products(first, second):
+    """Return the products (n,3,3) of matrices (n,3,3), one by one."""
+    out = np.zeros(first.shape)
+    for i in range(first.shape[0]):
+        for r in range(3):
+            for c in range(3):
+                for k in range(3):
+                    out[i, r, c] += first[i, r, k] * second[i, k, c]
+    return out
+
+
+@njit(cache=True, nogil=True)
 def rotation_vectors(matrices):
     """Return rotation vectors (n,3) [rad], of angle at most pi, of rotation matrices (n,3,3).
 

@@ -30,6 +30,13 @@ def _beside(y, x, k):
 
 
 @njit(cache=True, nogil=True)
+def _may_join(y, x, inside, allowed):
+    """Return whether a pixel is one of the image, allowed, and not inside yet."""
+    h, w = inside.shape
+    return 0 <= y < h and 0 <= x < w and not inside[y, x] and allowed[y, x]
+
+
+@njit(cache=True, nogil=True)
 def segment(depth, rendered, own, gamma, tolerance, growth, nearest, out):
     """Fill `out` with the measured pixels of a body: those it covers, and the rim joined to them.
 
@@ -58,7 +65,7 @@ def segment(depth, rendered, own, gamma, tolerance, growth, nearest, out):
         head += 1
         for k in range(4):
             ny, nx = _beside(y, x, k)
-            if ny < 0 or nx < 0 or ny >= h or nx >= w or out[ny, nx] or not own[ny, nx]:
+            if not _may_join(ny, nx, out, own):
                 continue
             if not abs(depth[ny, nx] - depth[y, x]) < gamma:
                 continue
@@ -76,7 +83,6 @@ def segment(depth, rendered, own, gamma, tolerance, growth, nearest, out):
 @njit(cache=True, nogil=True)
 def flood(inside, allowed):
     """Add to `inside` the allowed pixels that hang together with it, side by side."""
-    h, w = inside.shape
     queue, tail = _listed(inside)
     head = 0
     while head < tail:
@@ -84,7 +90,7 @@ def flood(inside, allowed):
         head += 1
         for k in range(4):
             ny, nx = _beside(y, x, k)
-            if ny < 0 or nx < 0 or ny >= h or nx >= w or inside[ny, nx] or not allowed[ny, nx]:
+            if not _may_join(ny, nx, inside, allowed):
                 continue
             inside[ny, nx] = True
             queue[tail, 0], queue[tail, 1] = ny, nx
@@ -108,7 +114,6 @@ def creep(inside, allowed, depth, step, step_per_square, centres, reach, fx, fy,
         cx: Column of the principal point [px].
         cy: Row of it.
     """
-    h, w = inside.shape
     queue, tail = _listed(inside)
     head = 0
     while head < tail:
@@ -117,7 +122,7 @@ def creep(inside, allowed, depth, step, step_per_square, centres, reach, fx, fy,
         here = depth[y, x]
         for k in range(4):
             ny, nx = _beside(y, x, k)
-            if ny < 0 or nx < 0 or ny >= h or nx >= w or inside[ny, nx] or not allowed[ny, nx]:
+            if not _may_join(ny, nx, inside, allowed):
                 continue
             z = depth[ny, nx]
             if not abs(z - here) < step + step_per_square * here * here:

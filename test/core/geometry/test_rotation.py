@@ -9,6 +9,7 @@ from pop_core.geometry.rotation import (
     to_quat_xyzw,
     to_rotvec,
 )
+from pop_core.geometry.rotation_kernels import products
 
 
 @pytest.fixture
@@ -54,3 +55,11 @@ def test_nearest_rotation_of_a_rotation_is_itself_and_never_a_reflection() -> No
     R = from_rotvec(np.array([0.3, -0.4, 1.0]))
     np.testing.assert_allclose(nearest_rotation(R), R, atol=1e-14)
     assert np.linalg.det(nearest_rotation(-R)) == pytest.approx(1.0)
+
+
+def test_products_are_those_of_matrices_also_of_transposed_ones() -> None:
+    rng = np.random.default_rng(2)
+    first, second = rng.normal(size=(2, 5, 3, 3))
+    np.testing.assert_allclose(products(first, second), first @ second, atol=1e-14)
+    turned = second.transpose(0, 2, 1)
+    np.testing.assert_allclose(products(first, turned), first @ turned, atol=1e-14)
