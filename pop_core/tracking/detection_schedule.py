@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,6 +18,9 @@ MOST_TRIES = 3  # whom looks go on contradicting is no news any more
 SOON = 2  # frames from one look to the next while somebody is not followed well
 # Frames are counted as of such a camera: at a lower rate people move farther from one to the next.
 RATE_HZ = 30.0
+# A camera that is slower leaves time to wait for a look, for this share of what lies between two
+# of its frames: whoever is followed is drawn to where their limbs are, not to where they were.
+WAITING_S, WAITING_SHARE = 0.05, 1.0 / 3.0
 LONGEST_S = 1000.0  # that is counted: before the first frame lies an eternity
 
 
@@ -46,6 +50,14 @@ class Gap:
     def is_of_slow_camera(self) -> bool:
         """Return whether it is the camera that leaves people unseen, and not we."""
         return self.of_camera_s > LONG_GAP_S
+
+
+    @property
+    def patience_s(self) -> float:
+        """Return for how long a frame may wait for what is made beside the following [s]."""
+        if self.is_of_slow_camera:
+            return math.inf
+        return WAITING_SHARE * self.of_camera_s if self.of_camera_s > WAITING_S else 0.0
 
 
 class DetectionSchedule:

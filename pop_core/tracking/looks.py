@@ -2,14 +2,15 @@
 
 A network takes as long as following a person through several frames. Given somebody who looks
 meanwhile, the tracker goes on, and what was seen in one frame comes in with a later one, moved on
-as far as those it belongs to have moved. Without, every frame waits for its look, so that results
-do not depend on the machine.
+as far as those it belongs to have moved; where the camera leaves time, a frame waits a little for
+its own look. Without, every frame waits for it, so that results do not depend on the machine.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from dataclasses import dataclass, field, replace
 from typing import Protocol, runtime_checkable
 
@@ -197,22 +198,23 @@ class Looks:
         return Look(frame, made.result(), places or {})
 
     def look(
-        self, watcher: Watcher, frame: RgbdFrame, undistorted: RgbdFrame, *, wait: bool
+        self, watcher: Watcher, frame: RgbdFrame, undistorted: RgbdFrame, *, patience_s: float
     ) -> Look | None:
-        """Return a look at the present frame, or begin it if nobody has to wait.
+        """Return a look at the present frame, or None while it is still being made.
 
         Args:
             watcher: Looks where nobody does meanwhile.
             frame: The frame as the camera gave it.
             undistorted: The same without distortion.
-            wait: Whether it is needed at once; one that is being made is forgotten then.
+            patience_s: For how long to wait for it; an earlier one is forgotten.
         """
         if self._lookout is None:
             return Look(undistorted, look_for_people(watcher, frame, undistorted))
         # The detector answers one question at a time.
         made = self._lookout.submit(look_for_people, frame, undistorted)
         self.forget()
-        if wait:
+        wait([made], None if patience_s == math.inf else patience_s)
+        if patience_s == math.inf or made.done():
             return Look(undistorted, made.result())
         self._made, self._frame = made, undistorted
         return None

@@ -153,11 +153,13 @@ class BodyTracker:
             has_begun: Whether it is somebody's first, who is elsewhere by now.
         """
         look = self._looks.take()
-        wait = has_begun or not self._tracks or self._gap.is_of_slow_camera
+        is_needed = has_begun or not self._tracks
+        patience_s = np.inf if is_needed else self._gap.patience_s
         if self._schedule.is_due(
                 self._tracks, self._gap, is_busy=self._fresh.is_busy, is_late=is_late,
-                is_looking=self._looks.is_busy and not wait):
-            look = self._looks.look(self.pipeline, frame, seen, wait=wait) or look
+                is_looking=self._looks.is_busy and patience_s < np.inf):
+            look = (
+                self._looks.look(self.pipeline, frame, seen, patience_s=patience_s) or look)
         if look is None and self._looks.is_busy:
             # A body found anew is compared by keypoints too.
             self._fresh.put_off()

@@ -1,8 +1,10 @@
 """Looks for people beside the following: what comes in late, and what is forgotten."""
 
+import math
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
+from threading import Timer
 
 import numpy as np
 import pytest
@@ -163,19 +165,51 @@ def test_a_look_that_is_needed_at_once_is_taken_before_an_old_one(
     stage: Stage, slow: Slow, person: BodyParameters
 ) -> None:
     looks, old, new = Looks(slow), a_frame(), a_frame()
-    assert looks.look(stage.tracker.pipeline, old, old, wait=False) is None
+    assert looks.look(stage.tracker.pipeline, old, old, patience_s=0.0) is None
     assert looks.is_busy
     slow.is_at_once = True
-    look = looks.look(stage.tracker.pipeline, new, new, wait=True)
+    look = looks.look(stage.tracker.pipeline, new, new, patience_s=math.inf)
     assert look is not None
     assert look.frame is new
     assert not looks.is_busy
     assert looks.take() is None
 
 
+def test_a_look_that_comes_in_while_it_is_waited_for_is_of_the_present_frame(
+    stage: Stage, slow: Slow
+) -> None:
+    looks, frame = Looks(slow), a_frame()
+    soon = Timer(0.05, slow.finish)
+    soon.start()
+    look = looks.look(stage.tracker.pipeline, frame, frame, patience_s=60.0)
+    assert look is not None
+    assert look.frame is frame
+    assert not look.places
+    assert not looks.is_busy
+
+
+def test_a_look_that_takes_longer_comes_in_with_a_later_frame(
+    stage: Stage, slow: Slow
+) -> None:
+    looks, frame = Looks(slow), a_frame()
+    assert looks.look(stage.tracker.pipeline, frame, frame, patience_s=0.01) is None
+    assert looks.is_busy
+    slow.finish()
+    look = looks.take()
+    assert look is not None
+    assert look.frame is frame
+
+
+@pytest.mark.parametrize(('rate_hz', 'patience_s'), [
+    (30.0, 0.0), (20.0, 0.0), (15.0, 1 / 45), (10.0, 1 / 30), (5.0, math.inf)])
+def test_slow_cameras_leave_time_to_wait_for_a_look(rate_hz: float, patience_s: float) -> None:
+    assert Gap(1.0 / rate_hz).patience_s == pytest.approx(patience_s)
+    assert Gap(3.0 / rate_hz, skipped=2).patience_s == pytest.approx(patience_s)
+
+
 def test_without_help_every_look_is_waited_for(stage: Stage) -> None:
     looks, frame = Looks(), a_frame()
-    look = looks.look(stage.tracker.pipeline, frame, frame, wait=False)
+    look = looks.look(stage.tracker.pipeline, frame, frame, patience_s=0.0)
     assert look is not None
     assert look.frame is frame
     assert not looks.is_busy
