@@ -251,7 +251,8 @@ class BodyPipeline:
         if scene.ground is not None:
             own &= ~scene.ground.floor_pixels(depth_m, camera)
         mask = np.zeros(scene.taken.shape, dtype=bool)
-        segment = segment_body(depth_m, rendered, own, camera.fx, self.config.segmentation)
+        segment = segment_body(
+            depth_m, rendered, own, camera.fx, self.config.segmentation, scene.noise)
         window.view(mask)[:] = with_holes(segment, ~np.isfinite(depth_m) & free, rendered)
         joints = fit.coarse.joints
         state = fitted_joint_states(self.model, joints, rendered, depth_m, camera)

@@ -151,7 +151,7 @@ class HypothesisSteps:
         gamma = self.segmentation.gamma_m * observation.window.stride
         near = segment_body(
             observation.depth_m, rendered, observation.own, observation.camera.fx,
-            replace(self.segmentation, gamma_m=min(gamma, 0.2)))
+            replace(self.segmentation, gamma_m=min(gamma, 0.2)), observation.noise)
         # What was recognised as the person is to be explained, however far the body is from it.
         return near | observation.recognised
 

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float32
 
+from pop_core.depth_noise import BASE_M, DepthNoise
 from pop_core.rendering.depth_renderer import RenderedDepth
 from pop_core.segmentation import growth_kernels
 from pop_core.settings import setting
 
 NEAREST_M = 0.3  # people are not nearer
+SIGMAS = 3.0  # of noise that are no step
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,12 +23,13 @@ class SegmentationConfig:
     gamma_m: float = setting(
         0.03, unit='m', minimum=0.005, maximum=0.2,
         about="Depth step between neighbouring pixels that still counts as one surface, the "
-        "paper's gamma.")
+        "paper's gamma, beside noise.")
     tolerance_m: float = setting(
         0.10, unit='m', minimum=0.02, maximum=0.5,
-        about='Distance between measured and rendered depth up to which a pixel is the body.')
+        about='Distance between measured and rendered depth, beside noise, up to which a pixel is '
+        'the body.')
     growth_m: float = setting(
-        0.06, unit='m', minimum=0.0, maximum=0.3,
+        0.04, unit='m', minimum=0.0, maximum=0.3,
         about='How far the segment may grow beyond the rendered silhouette: clothes and hair.')
 
 
@@ -36,12 +39,15 @@ def segment_body(
     own: Bool[np.ndarray, 'h w'],
     focal_px: float,
     config: SegmentationConfig,
+    noise: DepthNoise,
 ) -> Bool[np.ndarray, 'h w']:
     """Return the pixels that show the person: the mask of clean depth and of H (step 6).
 
     The rendered body is a mask; pixels around it join when their depth is within gamma of a
     neighbour already inside. Growth stays within `growth_m` of the silhouette and `tolerance_m`
-    of the depth of the nearest rendered pixel, so that it cannot run along a seat or a floor.
+    of the depth of the nearest rendered pixel, so that it cannot run along a seat or a floor. Far
+    from a sensor that triangulates, neighbours on one surface differ by more than gamma: noise
+    counts beside it.
 
     Args:
         depth_m: Measured depth D_in [m].
@@ -49,12 +55,13 @@ def segment_body(
         own: Pixels that may show this person.
         focal_px: Focal length [px], which turns `growth_m` into pixels.
         config: Thresholds.
+        noise: Noise of the measured depth.
     """
     out = np.zeros(depth_m.shape, dtype=bool)
     growth_kernels.segment(
         np.ascontiguousarray(depth_m), np.ascontiguousarray(rendered.depth_m),
         np.ascontiguousarray(own), config.gamma_m, config.tolerance_m,
-        config.growth_m * focal_px, NEAREST_M, out)
+        SIGMAS * BASE_M, SIGMAS * noise.per_m, config.growth_m * focal_px, NEAREST_M, out)
     return out
 
 

@@ -37,7 +37,7 @@ def _may_join(y, x, inside, allowed):
 
 
 @njit(cache=True, nogil=True)
-def segment(depth, rendered, own, gamma, tolerance, growth, nearest, out):
+def segment(depth, rendered, own, gamma, tolerance, blur, blur_per_square, growth, nearest, out):
     """Fill `out` with the measured pixels of a body: those it covers, and the rim joined to them.
 
     Args:
@@ -46,6 +46,8 @@ def segment(depth, rendered, own, gamma, tolerance, growth, nearest, out):
         own: (h,w) pixels that may be the person's.
         gamma: Depth step that is still one surface [m].
         tolerance: Distance from the body's depth that is still the body [m].
+        blur: What noise adds to both [m].
+        blur_per_square: Growth of it with the square of depth [1/m].
         growth: How wide the rim is [m px]: over depth, a number of pixels.
         nearest: Depth that nobody is nearer than [m].
         out: (h,w), all false.
@@ -57,7 +59,8 @@ def segment(depth, rendered, own, gamma, tolerance, growth, nearest, out):
         for x in range(w):
             out[y, x] = (
                 rendered[y, x] != np.inf and own[y, x]
-                and abs(depth[y, x] - rendered[y, x]) < tolerance)
+                and abs(depth[y, x] - rendered[y, x])
+                < tolerance + blur + blur_per_square * rendered[y, x] * rendered[y, x])
     queue, tail = _listed(out)
     head = 0
     while head < tail:
@@ -67,14 +70,15 @@ def segment(depth, rendered, own, gamma, tolerance, growth, nearest, out):
             ny, nx = _beside(y, x, k)
             if not _may_join(ny, nx, out, own):
                 continue
-            if not abs(depth[ny, nx] - depth[y, x]) < gamma:
+            noise = blur + blur_per_square * depth[y, x] * depth[y, x]
+            if not abs(depth[ny, nx] - depth[y, x]) < gamma + noise:
                 continue
             squared, body_y, body_x = nearest_pixel(row, ny, nx, farthest)
             if body_y < 0:
                 continue
             body = rendered[body_y, body_x]
             reach = growth / max(body, nearest)
-            if abs(depth[ny, nx] - body) < tolerance and squared <= reach * reach:
+            if abs(depth[ny, nx] - body) < tolerance + noise and squared <= reach * reach:
                 out[ny, nx] = True
                 queue[tail, 0], queue[tail, 1] = ny, nx
                 tail += 1
