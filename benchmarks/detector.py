@@ -19,7 +19,7 @@ from benchmarks.detector_pictures import draw_detections
 from benchmarks.detector_real import REAL, real_frames
 from benchmarks.detector_scores import DetectorScores
 from pop_core.body.default_body import default_body
-from pop_core.keypoints.depth_net import EMBEDDED
+from pop_core.keypoints.depth_network import EMBEDDED
 from pop_core.keypoints.detection import KeypointDetector
 from pop_core.synthesis.scene_config import training_config
 from pop_core.synthesis.scenes import synthesise_scene

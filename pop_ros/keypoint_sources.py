@@ -147,7 +147,8 @@ def _source(
 
 
 def _depth_detector() -> KeypointDetector:
-    from pop_core.keypoints.depth_net import EMBEDDED, load_depth_net
+    from pop_core.keypoints.depth_net import load_depth_net
+    from pop_core.keypoints.depth_network import EMBEDDED
 
     if not EMBEDDED.is_file():
         raise SourceError(
@@ -179,7 +180,8 @@ def _json_detector(folder: Path | None) -> KeypointDetector:
 
 def _network(word: str) -> OnnxSource | DepthNetDetector:
     from pop_core.keypoints.decoders import DECODERS
-    from pop_core.keypoints.depth_net import DepthNetDetector, is_depth_net
+    from pop_core.keypoints.depth_net import load_depth_net
+    from pop_core.keypoints.depth_network import is_depth_net
     from pop_core.keypoints.onnx_detector import source_of
     from pop_core.keypoints.onnx_session import OnnxSession, load_network
     from pop_ros.network_registry import find_entry, verified_network
@@ -195,5 +197,5 @@ def _network(word: str) -> OnnxSource | DepthNetDetector:
         raise SourceError(f'keypoints: expected {SOURCES}, found {path}, which {why}')
     session = load_network(path)
     if decoder is None and is_depth_net(session):
-        return DepthNetDetector(session)
+        return load_depth_net(path)
     return source_of(session, decoder)

@@ -1,8 +1,8 @@
 """A second look at one person: enlarged and brought near, as the network sees people best.
 
 Enlarging alone would make giants of far people. Their depth is shifted instead of scaled, so that
-the relief of a body stays what it is: somebody at 4 m who is shown at 1.5 m, with 4 / 1.5 times
-the pixels, is as large, as thick and as far from the wall as before.
+the relief of a body stays what it is: somebody at 4 m who is shown at 2 m, with twice the pixels,
+is as large, as thick and as far from the wall as before. Who is too near is shown farther alike.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pop_core.geometry.camera import Camera
 from pop_core.keypoints.canonical_depth import SIDE_MULTIPLE, CanonicalView
 from pop_core.keypoints.canonical_depth_kernels import read_depth
 
-SHOWN_AT_M = 1.5
+SHOWN_AT_M = 1.5  # by networks of whole images: where they see people best
 MARGIN_M = 0.15  # hands, feet and the top of the head lie beyond the joints; guesses err
 SIDES_PX = (96, 224)
 # What stands this far before somebody brought near would be nearer than anything a network learns
@@ -35,11 +35,13 @@ class NetworkView:
         camera: The pinhole that the network believes in.
         enlarged: How many times as long as its focal length the real one is [px].
         nearer_m: By how much everything is shown nearer than it is [m].
+        nearest_m: What would be shown before this is left out [m].
     """
 
     camera: Camera
     enlarged: float = 1.0
     nearer_m: float = 0.0
+    nearest_m: float = 0.0
 
     def to_camera(self, shown: Float[np.ndarray, '... 3']) -> Float[np.ndarray, '... 3']:
         """Return where points that the network speaks of lie in the camera frame [m]."""
@@ -56,17 +58,18 @@ class NetworkView:
 
 
 def close_view(
-    focal_px: float, joints: Float[np.ndarray, 's 3'], surface_m: float, fine: CanonicalView
+    focal_px: float, enlarged: float, joints: Float[np.ndarray, 's 3'], surface_m: float,
+    fine: CanonicalView,
 ) -> NetworkView:
     """Return the view that shows a person near and in the middle, no larger than needed.
 
     Args:
         focal_px: The network's focal length.
+        enlarged: How many times as large as that focal length has them people are shown.
         joints: Where the person's joints may be, camera frame [m].
         surface_m: Depth of the person's surface [m].
         fine: A view of the camera: beyond its borders there is nothing to show.
     """
-    enlarged = max(surface_m / SHOWN_AT_M, 1.0)
     rays = joints[:, :2] / joints[:, 2:]
     margin = MARGIN_M / surface_m
     seen = fine.camera
@@ -80,7 +83,9 @@ def close_view(
         for extent in (high - low) * scale)
     centre = np.array([columns - 1, rows - 1]) / 2 - (low + high) / 2 * scale
     camera = Camera(columns, rows, focal_px, focal_px, float(centre[0]), float(centre[1]))
-    return NetworkView(camera, enlarged, surface_m * (1.0 - 1.0 / enlarged))
+    shown_at_m = surface_m / enlarged
+    nearest_m = shown_at_m - BEFORE_M if enlarged != 1.0 else 0.0
+    return NetworkView(camera, enlarged, surface_m - shown_at_m, nearest_m)
 
 
 def close_depth(
@@ -100,9 +105,8 @@ def close_depth(
         for size, centre, fine_centre, scale in (
             (shown.height, shown.cy, fine.camera.cy, _ratio(fine, view)),
             (shown.width, shown.cx, fine.camera.cx, _ratio(fine, view))))
-    nearest_m = SHOWN_AT_M - BEFORE_M if view.nearer_m > 0 else 0.0
     read_depth(
-        depth_m, fine.source_v, fine.source_u, rows, columns, view.nearer_m, nearest_m, out)
+        depth_m, fine.source_v, fine.source_u, rows, columns, view.nearer_m, view.nearest_m, out)
     return out
 
 

@@ -7,18 +7,16 @@ shows the whole image and finds who is where, then each of them is looked at fro
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float
 
 from pop_core.errors import NetworkShapeError
 from pop_core.geometry.camera import Camera
-from pop_core.keypoints.body_parts import N_CLASSES
 from pop_core.keypoints.canonical_depth import (
     LARGEST_SIDE,
     CanonicalView,
@@ -28,24 +26,19 @@ from pop_core.keypoints.canonical_depth import (
 from pop_core.keypoints.close_view import FINEST, NetworkView, close_depth, close_view
 from pop_core.keypoints.depth_grouping import group_cells, nearest_trunk
 from pop_core.keypoints.depth_masks import PixelLabels, label_pixels, no_labels
-from pop_core.keypoints.depth_votes import Cells, DepthNetConfig, read_cells
+from pop_core.keypoints.depth_network import EMBEDDED, DepthNetwork, close_path
+from pop_core.keypoints.depth_votes import Cells, DepthNetConfig
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.joint_surface import joints_with_skin
-from pop_core.keypoints.network import Tensor
-from pop_core.keypoints.onnx_session import OnnxSession, load_network
+from pop_core.keypoints.onnx_session import load_network
 from pop_core.keypoints.vote_fusion import VotedPerson, fuse_votes
 from pop_core.rgbd import RgbdFrame
 
-EMBEDDED = Path(__file__).parents[1] / 'data' / 'depth_net.onnx'
-KIND, FORMAT = 'pop_depth_net', '1'
-OUTPUTS = (('parts', N_CLASSES), ('votes', 45), ('log_sigma', 15), ('visible', 15))
-EXPECTED = ('a depth network of this package: depth_m (1, 1, ?, ?) float32 -> '
-            + ', '.join(f'{name} (1, {channels}, ?, ?)' for name, channels in OUTPUTS))
 FEWEST_CELLS = 4
 FARTHEST_M = 30.0  # no depth camera sees people there: the image is not in metres
 MOST_LOOKS = 32  # an image of nothing but noise must not take seconds
+NEAR_SHARE = 0.9  # of the near look in the logarithm of a person's score
 BOX_SCORE = 0.3  # of joints whose pixels a person's box holds: thin limbs may lack in the mask
-FOCAL_PX = (40.0, 1000.0)  # no network of this kind looks finer or coarser
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,26 +68,36 @@ class Look:
 class DepthNetDetector:
     """People found by the depth network, in every camera's depth."""
 
-    def __init__(self, session: OnnxSession, config: DepthNetConfig | None = None) -> None:
-        """Take a loaded network.
+    def __init__(
+        self, network: DepthNetwork, config: DepthNetConfig | None = None,
+        close: DepthNetwork | None = None,
+    ) -> None:
+        """Take loaded networks.
 
         Args:
-            session: A network written by `python -m pop_core.training export`.
+            network: Finds people in whole images.
             config: Settings of the decoding.
+            close: Looks at each of them from near; without, the first one does.
 
         Raises:
-            NetworkShapeError: If it is no network of this kind.
+            NetworkShapeError: If one was trained for the other's look.
         """
+        if network.is_close:
+            raise _other_look(network, 'whole images')
+        if close is not None and not close.is_close:
+            raise _other_look(close, 'near looks')
         self.config = config or DepthNetConfig()
-        self.focal_px = _focal(session)
-        self._session = session
+        self._network, self._close = network, close or network
         self._views: Views | None = None
 
     @property
     def reason(self) -> str:
-        """Return what the network is."""
-        return (f'{self._session.where}: people from depth alone '
-                f'({self._session.facts.get("about", "nothing said about its training")})')
+        """Return what the networks are."""
+        each = dict.fromkeys((self._network, self._close))
+        return 'people from depth alone: ' + ', '.join(
+            f'{network.session.where} '
+            f'({network.session.facts.get("about", "nothing said about its training")})'
+            for network in each)
 
     def detect(self, frame: RgbdFrame) -> list[Detection]:
         """Return the people of a frame, best first."""
@@ -112,7 +115,7 @@ class DepthNetDetector:
         """Return everybody who may be in a frame, the largest first."""
         canonical = self.views(frame.camera).whole
         depth_m, view = canonical_depth(frame.depth_m, canonical), NetworkView(canonical.camera)
-        cells = self.cells(depth_m, view)
+        cells = self._network.cells(depth_m, view, self.config.min_person_probability)
         if len(cells) < FEWEST_CELLS:
             return []
         member = group_cells(cells, self.config)
@@ -133,32 +136,32 @@ class DepthNetDetector:
             index: The one to look at.
         """
         person, fine = looks[index].person, self.views(frame.camera).fine
-        view = close_view(self.focal_px, person.joints, person.surface_m, fine)
-        cells = self.cells(close_depth(frame.depth_m, fine, view), view)
+        network = self._close
+        view = close_view(
+            network.focal_px, network.enlarged(person.surface_m), person.joints, person.surface_m,
+            fine)
+        cells = network.cells(
+            close_depth(frame.depth_m, fine, view), view, self.config.min_person_probability)
         trunks = np.array([look.trunk for look in looks])
         own = cells.chosen(nearest_trunk(cells, trunks, self.config.reach_m) == index)
         if len(own) < FEWEST_CELLS:
             return None
-        closer = fuse_votes(own)
-        if not np.isfinite(closer.joints).all():
+        closer, both = fuse_votes(own), fuse_votes(own.joined(looks[index].cells))
+        if not np.isfinite(both.joints).all():
             return None
-        # What deceives one look seldom deceives both.
-        return Look(closer, own, view, math.sqrt(closer.score * looks[index].score))
-
-    def cells(self, shown_m: Float32[np.ndarray, 'h w'], view: NetworkView) -> Cells:
-        """Return what the network says of what it is shown [m]."""
-        return read_cells(self.run(shown_m), shown_m, view, self.config.min_person_probability)
-
-    def run(self, depth_m: Float32[np.ndarray, 'h w']) -> Sequence[Tensor]:
-        """Return parts, votes, log sigma and visibility of a depth image [m]."""
-        return [output[0] for output in self._session.run(depth_m[None, None])]
+        # Near looks know better, but what deceives one look seldom deceives both.
+        score = closer.score ** NEAR_SHARE * looks[index].score ** (1.0 - NEAR_SHARE)
+        return Look(
+            replace(closer, joints=both.joints, sigma_m=both.sigma_m, visible=both.visible),
+            own, view, score)
 
     def views(self, camera: Camera) -> Views:
         """Return the views of a camera; kept while the camera stays the same."""
         if self._views is None or not self._views.camera.sees_like(camera):
-            self._views = Views(camera, canonical_view(camera, self.focal_px),
-                                canonical_view(
-                                    camera, FINEST * self.focal_px, FINEST * LARGEST_SIDE))
+            fine_px = FINEST * self._close.focal_px
+            self._views = Views(
+                camera, canonical_view(camera, self._network.focal_px),
+                canonical_view(camera, fine_px, FINEST * LARGEST_SIDE))
         return self._views
 
 
@@ -167,15 +170,20 @@ def load_depth_net(
 ) -> DepthNetDetector:
     """Return the detector of a file, the embedded one by default.
 
+    A network of near looks is taken where it lies beside: NET_close.onnx for NET.onnx.
+
     Raises:
         NetworkShapeError: If there is no such file or it is no network of this kind.
     """
-    return DepthNetDetector(load_network(path), config)
+    beside = close_path(path)
+    close = DepthNetwork(load_network(beside)) if beside.is_file() else None
+    return DepthNetDetector(DepthNetwork(load_network(path)), config, close)
 
 
-def is_depth_net(session: OnnxSession) -> bool:
-    """Return whether a network says that it is one of this kind."""
-    return KIND in session.facts
+def _other_look(network: DepthNetwork, wanted: str) -> NetworkShapeError:
+    return NetworkShapeError(
+        f'{network.session.where}: expected a network of {wanted}, found one trained for another '
+        'look (docs/training.md)')
 
 
 def distinct(looks: Sequence[Look], config: DepthNetConfig) -> list[Look]:
@@ -212,27 +220,3 @@ def _detection(
         joint_sigma_m=np.where(inside, np.sqrt(2.0) * person.sigma_m, np.nan),
         visible=person.visible, person_mask=mask,
         part_labels=np.where(mask, labels.part, np.int8(-1)))
-
-
-def _focal(session: OnnxSession) -> float:
-    """Return the focal length that a network of this kind was trained for [px].
-
-    Raises:
-        NetworkShapeError: If it is of another kind or format.
-    """
-    found = session.facts.get(KIND, 'none')
-    outputs = tuple((o.name, o.shape[1] if len(o.shape) == 4 else None)
-                    for o in session.spec.outputs)
-    if found != FORMAT or outputs != OUTPUTS or len(session.spec.inputs) != 1:
-        raise NetworkShapeError(
-            f'{session.where}: expected {EXPECTED}, format {FORMAT}; found {session.spec}, '
-            f'format {found}')
-    try:
-        focal_px = float(session.facts.get('focal_px', 'nan'))
-    except ValueError:
-        focal_px = float('nan')
-    if not FOCAL_PX[0] <= focal_px <= FOCAL_PX[1]:
-        raise NetworkShapeError(
-            f'{session.where}: expected a focal length of {FOCAL_PX[0]} to {FOCAL_PX[1]} px, '
-            f'found {session.facts.get("focal_px")!r}')
-    return focal_px

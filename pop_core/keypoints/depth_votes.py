@@ -82,6 +82,11 @@ class Cells:
         """Return some of the cells."""
         return Cells(*(getattr(self, name)[rows] for name in Cells.__slots__))
 
+    def joined(self, others: Cells) -> Cells:
+        """Return these cells and others."""
+        return Cells(*(np.concatenate([getattr(self, name), getattr(others, name)])
+                       for name in Cells.__slots__))
+
 
 def read_cells(
     outputs: Sequence[Tensor], shown_m: Float32[np.ndarray, 'H W'], view: NetworkView,

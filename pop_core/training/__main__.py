@@ -14,7 +14,7 @@ from pop_core.training.export import export_onnx
 from pop_core.training.network import NetworkConfig
 from pop_core.training.run import RunConfig, train
 from pop_core.training.run import validate as validated
-from pop_core.training.scene_writer import write_shards
+from pop_core.training.scene_writer import SceneKind, write_shards
 from pop_core.training.trainer import TrainConfig, Trainer, load_network, read_checkpoint
 
 BAD_INPUT = 2
@@ -22,8 +22,9 @@ SIZES = {
     'small': NetworkConfig(),
     'large': NetworkConfig(
         widths=(24, 48, 80, 128, 176), blocks=(1, 2, 2, 1), pyramid=80, focal_px=224.0),
+    'close': NetworkConfig(shown_at_m=2.0),
 }
-IMAGES = {'small': (192, 160), 'large': (288, 224)}
+IMAGES = {'small': (192, 160), 'large': (288, 224), 'close': (128, 160)}
 app = typer.Typer(add_completion=False, no_args_is_help=True, rich_markup_mode=None)
 
 Size = Annotated[str, typer.Option('--size', help=f'One of {", ".join(SIZES)}.')]
@@ -46,8 +47,8 @@ def scenes(
     """
     network = _network(size)
     for done in write_shards(
-            out, count, seed=seed, size=IMAGES[size], focal_px=network.focal_px, workers=workers,
-            mocap=mocap):
+            out, count, seed=seed, workers=workers, kind=SceneKind(
+                IMAGES[size], network.focal_px, network.shown_at_m, mocap)):
         typer.echo(f'{done} scenes in {out}')
 
 

@@ -9,7 +9,7 @@ import onnx
 import torch
 
 from pop_core.keypoints.canonical_depth import STRIDE
-from pop_core.keypoints.depth_net import FORMAT, KIND
+from pop_core.keypoints.depth_network import FORMAT, KIND
 from pop_core.training.network import DepthMaps, DepthNet
 
 OPSET = 17
@@ -36,6 +36,8 @@ def export_onnx(network: DepthNet, path: Path, about: str = '') -> None:
     model = onnx.load(path)
     facts = {KIND: FORMAT, 'focal_px': str(network.config.focal_px),
              'stride': str(STRIDE), 'about': about}
+    if network.config.shown_at_m is not None:
+        facts['shown_at_m'] = str(network.config.shown_at_m)
     for key, value in facts.items():
         model.metadata_props.add(key=key, value=value)
     onnx.save(model, str(path))

@@ -35,12 +35,15 @@ class NetworkConfig:
         blocks: Residual blocks at strides 4, 8, 16 and 32.
         pyramid: Channels of the feature pyramid.
         focal_px: Focal length that inputs are resampled to [px].
+        shown_at_m: Depth at which the network is shown one person at a time; None for a network
+            that looks at whole images.
     """
 
     widths: tuple[int, ...] = (16, 24, 48, 96, 144)
     blocks: tuple[int, ...] = (1, 1, 1, 1)
     pyramid: int = 48
     focal_px: float = 160.0
+    shown_at_m: float | None = None
 
 
 class DepthMaps(NamedTuple):

@@ -15,7 +15,7 @@ from pop_core.training.augmentation import cropped, varied
 from pop_core.training.curves import save_curves
 from pop_core.training.scene_pool import ScenePool
 from pop_core.training.scene_stream import SceneStream
-from pop_core.training.scene_writer import SHARD_SCENES
+from pop_core.training.scene_writer import SHARD_SCENES, SceneKind
 from pop_core.training.shards import Shard, ShardError, load_shard, shard_paths
 from pop_core.training.targets import Batch, make_targets
 from pop_core.training.trainer import Trainer
@@ -63,9 +63,10 @@ def train(trainer: Trainer, config: RunConfig, say: Callable[[str], None]) -> No
     if checkpoint.exists():
         trainer.load(checkpoint)
         say(f'going on after {trainer.images} images')
-    focal_px = trainer.network.config.focal_px
+    network = trainer.network.config
     seed = config.seed + trainer.images  # a run that goes on must not see the same scenes again
-    with SceneStream(config.workers, seed, config.size, focal_px, config.mocap) as stream:
+    kind = SceneKind(config.size, network.focal_px, network.shown_at_m, config.mocap)
+    with SceneStream(config.workers, seed, kind) as stream:
         pool = _filled(config, trainer.device, stream, say)
         _loop(trainer, config, pool, stream, say)
 

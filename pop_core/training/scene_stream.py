@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from multiprocessing import get_context
-from pathlib import Path
 from queue import Empty
 from typing import TYPE_CHECKING, Any
 
-from pop_core.body.default_body import default_body
-from pop_core.synthesis.coarse_body import coarse_body
-from pop_core.synthesis.training_scenes import TrainingScenes
-from pop_core.training.scene_writer import MARGIN_PX, load_motions
+from pop_core.training.scene_writer import SceneKind, scene_stream
 from pop_core.training.shards import Shard, ShardError, pack
 
 if TYPE_CHECKING:
@@ -22,25 +18,20 @@ PIECE = 64  # scenes handed over at once
 class SceneStream:
     """Scenes of as many processes as cores are free, in no particular order."""
 
-    def __init__(
-        self, workers: int, seed: int, size: tuple[int, int], focal_px: float,
-        mocap: Path | None = None,
-    ) -> None:
+    def __init__(self, workers: int, seed: int, kind: SceneKind) -> None:
         """Start the processes.
 
         Args:
             workers: Number of processes.
             seed: Decides what each of them draws.
-            size: Width and height of the network's input [px].
-            focal_px: Its focal length [px].
-            mocap: File of captured poses.
+            kind: Which scenes.
         """
         context = get_context('spawn')  # the parent may hold a GPU, which no fork survives
         self._queue: Any = context.Queue(maxsize=4 * workers)
         self._workers = [
             context.Process(
                 target=_draw_forever, daemon=True,
-                args=(self._queue, seed * 1000 + k, size, focal_px, mocap))
+                args=(self._queue, seed * 1000 + k, kind))
             for k in range(workers)]
         for worker in self._workers:
             worker.start()
@@ -76,12 +67,7 @@ class SceneStream:
         return piece
 
 
-def _draw_forever(
-    queue: Any, seed: int, size: tuple[int, int], focal_px: float, mocap: Path | None
-) -> None:
-    motions = load_motions(mocap) if mocap is not None else ()
-    scenes = TrainingScenes(
-        coarse_body(default_body()), seed, width=size[0] + MARGIN_PX, height=size[1] + MARGIN_PX,
-        focal_px=focal_px, motions=motions)
+def _draw_forever(queue: Any, seed: int, kind: SceneKind) -> None:
+    scenes = scene_stream(kind, seed)
     while True:
         queue.put(pack([scenes.draw() for _ in range(PIECE)]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from jaxtyping import Float
 from pop_core.body.default_body import default_body
 from pop_core.synthesis.coarse_body import coarse_body
 from pop_core.synthesis.training_scenes import TrainingScenes
+from pop_core.training.close_scenes import FINE_FOCAL_PX, FINE_SIZE, CloseScenes
 from pop_core.training.shards import ShardError, pack, save_shard
 
 SHARD_SCENES = 256
@@ -34,9 +36,41 @@ def load_motions(path: Path) -> list[Float[np.ndarray, '23 3']]:
     return list(pose[:, 1:])
 
 
+@dataclass(frozen=True, slots=True)
+class SceneKind:
+    """Which scenes a network learns from.
+
+    Args:
+        size: Width and height of the network's input [px]; scenes are larger by a margin.
+        focal_px: Focal length of the network's input [px].
+        shown_at_m: Depth at which each person appears alone; None for the whole image.
+        mocap: File of captured poses to draw from as well.
+    """
+
+    size: tuple[int, int]
+    focal_px: float
+    shown_at_m: float | None = None
+    mocap: Path | None = None
+
+
+def scene_stream(kind: SceneKind, seed: int) -> TrainingScenes | CloseScenes:
+    """Return the endless stream of scenes of a seed."""
+    motions = load_motions(kind.mocap) if kind.mocap is not None else ()
+    model = coarse_body(default_body())
+    width, height = (side + MARGIN_PX for side in kind.size)
+    if kind.shown_at_m is None:
+        return TrainingScenes(
+            model, seed, width=width, height=height, focal_px=kind.focal_px, motions=motions)
+    fine = TrainingScenes(
+        model, seed, width=FINE_SIZE[0], height=FINE_SIZE[1], focal_px=FINE_FOCAL_PX,
+        motions=motions)
+    return CloseScenes(
+        fine, seed, width=width, height=height, focal_px=kind.focal_px,
+        shown_at_m=kind.shown_at_m)
+
+
 def write_shards(
-    folder: Path, count: int, *, seed: int, size: tuple[int, int], focal_px: float,
-    workers: int = 1, mocap: Path | None = None,
+    folder: Path, count: int, *, seed: int, kind: SceneKind, workers: int = 1
 ) -> Iterator[int]:
     """Write at least `count` scenes and yield how many are done after every shard.
 
@@ -44,12 +78,10 @@ def write_shards(
         folder: Where `<seed>_<number>.npz` are written.
         count: Number of scenes, rounded up to whole shards.
         seed: Decides every scene, whatever the number of workers.
-        size: Width and height of the network's input [px].
-        focal_px: Focal length of the network's input [px].
+        kind: Which scenes.
         workers: Processes.
-        mocap: File of captured poses to draw from as well.
     """
-    jobs = [(folder / f'{seed:04d}_{k:05d}.npz', seed * 100_000 + k, size, focal_px, mocap)
+    jobs = [(folder / f'{seed:04d}_{k:05d}.npz', seed * 100_000 + k, kind)
             for k in range(-(-count // SHARD_SCENES))]
     todo = [job for job in jobs if not job[0].exists()]
     done = (len(jobs) - len(todo)) * SHARD_SCENES
@@ -65,10 +97,7 @@ def write_shards(
             yield done
 
 
-def _write(job: tuple[Path, int, tuple[int, int], float, Path | None]) -> None:
-    path, seed, (width, height), focal_px, mocap = job
-    motions = load_motions(mocap) if mocap is not None else ()
-    scenes = TrainingScenes(
-        coarse_body(default_body()), seed, width=width + MARGIN_PX, height=height + MARGIN_PX,
-        focal_px=focal_px, motions=motions)
-    save_shard(pack([scenes.draw() for _ in range(SHARD_SCENES)]), path)
+def _write(job: tuple[Path, int, SceneKind]) -> None:
+    path, seed, kind = job
+    stream = scene_stream(kind, seed)
+    save_shard(pack([stream.draw() for _ in range(SHARD_SCENES)]), path)

@@ -30,7 +30,7 @@ def somebody(z_m, x_m=0.0, height_m=1.4):
 def view_of(camera, z_m, x_m=0.0, height_m=1.4):
     joints, surface_m = somebody(z_m, x_m, height_m)
     fine = canonical_view(camera, FINEST * FOCAL_PX, FINEST * LARGEST_SIDE)
-    return close_view(FOCAL_PX, joints, surface_m, fine), fine
+    return close_view(FOCAL_PX, max(surface_m / SHOWN_AT_M, 1.0), joints, surface_m, fine), fine
 
 
 @pytest.mark.parametrize('enlarged', [1.0, 2.7])

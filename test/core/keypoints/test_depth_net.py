@@ -8,7 +8,8 @@ from pop_core.body.default_body import default_body
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.canonical_depth import canonical_depth, canonical_view
 from pop_core.keypoints.depth_grouping import group_cells
-from pop_core.keypoints.depth_net import EMBEDDED, DepthNetDetector
+from pop_core.keypoints.depth_net import DepthNetDetector
+from pop_core.keypoints.depth_network import EMBEDDED, DepthNetwork, close_path
 from pop_core.keypoints.depth_votes import Cells, DepthNetConfig, cell_depth, read_cells
 from pop_core.keypoints.onnx_session import load_network
 from pop_core.keypoints.vote_fusion import fuse_votes
@@ -19,18 +20,25 @@ from pop_core.synthesis.training_scenes import TrainingScenes
 VGA = Camera(640, 480, 525.0, 525.0, 319.5, 239.5)
 
 
-class PerfectDetector(DepthNetDetector):
-    """The detector, with a network that knows the scene."""
+class PerfectNetwork(DepthNetwork):
+    """A network that knows the scene, or only some cells of it."""
 
-    def __init__(self, scene):
+    def __init__(self, scene, *, is_close=False, share=1.0):
         """Take the scene."""
-        super().__init__(load_network(EMBEDDED))
-        self.scene = scene
+        super().__init__(load_network(close_path(EMBEDDED) if is_close else EMBEDDED))
+        self.scene, self.share = scene, share
 
-    def cells(self, shown_m, view):
+    def cells(self, shown_m, view, min_probability):
         """Return what a perfect network says of a view of the scene."""
         maps = truth_maps(shown_scene(self.scene, shown_m, view))
-        return read_cells(maps, shown_m, view, self.config.min_person_probability)
+        cells = read_cells(maps, shown_m, view, min_probability)
+        return cells.chosen(np.arange(round(self.share * len(cells))))
+
+
+def perfect_detector(scene, *, has_close=True):
+    """Return the detector with networks that know the scene."""
+    close = PerfectNetwork(scene, is_close=True) if has_close else None
+    return DepthNetDetector(PerfectNetwork(scene), close=close)
 
 
 @pytest.fixture(scope='module')
@@ -39,10 +47,13 @@ def scenes():
     return [stream.draw() for _ in range(24)]
 
 
-def detections(scene):
+def frame_of(scene):
+    return RgbdFrame(np.zeros((*scene.depth_m.shape, 3), np.uint8), scene.depth_m, scene.camera)
+
+
+def detections(scene, *, has_close=True):
     """Return what perfect maps of a scene are decoded into."""
-    frame = RgbdFrame(np.zeros((*scene.depth_m.shape, 3), np.uint8), scene.depth_m, scene.camera)
-    return PerfectDetector(scene).detect(frame)
+    return perfect_detector(scene, has_close=has_close).detect(frame_of(scene))
 
 
 def shown_people(scene, least_m2=0.06):
@@ -51,11 +62,12 @@ def shown_people(scene, least_m2=0.06):
     return [k for k in range(len(scene.people)) if area_m2[scene.owner == k].sum() > least_m2]
 
 
-def test_perfect_maps_give_everybody_once(scenes):
+@pytest.mark.parametrize('has_close', [True, False], ids=['two networks', 'one network'])
+def test_perfect_maps_give_everybody_once(scenes, has_close):
     for scene in scenes:
         wanted = len(shown_people(scene))
         there = sum((scene.owner == k).any() for k in range(len(scene.people)))
-        assert wanted <= len(detections(scene)) <= there
+        assert wanted <= len(detections(scene, has_close=has_close)) <= there
 
 
 def test_perfect_maps_give_joints_where_they_are_hidden_ones_too(scenes):
@@ -108,41 +120,25 @@ def test_boxes_hold_the_mask_and_the_joints_that_are_seen(scenes):
     assert checked > 100
 
 
-class Doubting(PerfectDetector):
-    """A detector that sees only some cells of whom it looks at from near."""
-
-    share = 0.0
-
-    def closer(self, frame, looks, index):
-        """Look with fewer cells."""
-        whole = self.cells
-        self.cells = lambda shown_m, view: thinned(whole(shown_m, view), self.share)
-        try:
-            return super().closer(frame, looks, index)
-        finally:
-            del self.cells
-
-
-def thinned(cells, share):
-    return cells.chosen(np.arange(round(share * len(cells))))
+def doubting(scene, share):
+    """Return a detector whose near looks see only a share of the cells."""
+    return DepthNetDetector(
+        PerfectNetwork(scene), close=PerfectNetwork(scene, is_close=True, share=share))
 
 
 def test_whom_the_near_look_does_not_show_is_nobody(scenes):
     scene = next(scene for scene in scenes if detections(scene))
-    frame = RgbdFrame(np.zeros((*scene.depth_m.shape, 3), np.uint8), scene.depth_m, scene.camera)
-    detector = Doubting(scene)
-    assert detector.first_look(frame)
-    assert detector.detect(frame) == []
+    detector = doubting(scene, 0.0)
+    assert detector.first_look(frame_of(scene))
+    assert detector.detect(frame_of(scene)) == []
 
 
 def test_both_looks_say_how_surely_somebody_is_there(scenes):
     scene = next(scene for scene in scenes if detections(scene))
-    frame = RgbdFrame(np.zeros((*scene.depth_m.shape, 3), np.uint8), scene.depth_m, scene.camera)
-    detector = Doubting(scene)
-    first = detector.first_look(frame)
+    first = perfect_detector(scene).first_look(frame_of(scene))
     scores = []
-    for detector.share in (0.3, 0.6, 1.0):
-        look = detector.closer(frame, first, 0)
+    for share in (0.3, 0.6, 1.0):
+        look = doubting(scene, share).closer(frame_of(scene), first, 0)
         low, high = sorted([look.person.score, first[0].score])
         assert low <= look.score <= high
         scores.append(look.score)

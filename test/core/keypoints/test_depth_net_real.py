@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from support.real_frames import SOFA, load
 
-from pop_core.keypoints.depth_net import EMBEDDED, load_depth_net
+from pop_core.keypoints.depth_net import load_depth_net
+from pop_core.keypoints.depth_network import EMBEDDED
 from pop_core.rgbd import RgbdFrame
 
 

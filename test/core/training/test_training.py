@@ -1,5 +1,7 @@
 """The network learns, goes on where it stopped, and means the same as ONNX."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,18 +10,20 @@ from pop_core.training.shards import ShardError, pack, save_shard
 
 torch = pytest.importorskip('torch')
 
-from pop_core.keypoints.depth_net import load_depth_net  # noqa: E402 - torch first
+from pop_core.keypoints.depth_network import DepthNetwork  # noqa: E402 - torch first
 from pop_core.training.export import export_onnx  # noqa: E402
 from pop_core.training.losses import losses  # noqa: E402
 from pop_core.training.muon import orthogonal  # noqa: E402
 from pop_core.training.network import (  # noqa: E402
     DepthMaps,
+    DepthNet,
     NetworkConfig,
     relief_channels,
 )
 from pop_core.training.run import RunConfig, train, validate  # noqa: E402
 from pop_core.training.scene_pool import ScenePool  # noqa: E402
 from pop_core.training.scene_stream import SceneStream  # noqa: E402
+from pop_core.training.scene_writer import SceneKind  # noqa: E402
 from pop_core.training.targets import make_targets  # noqa: E402
 from pop_core.training.trainer import (  # noqa: E402
     CheckpointError,
@@ -152,7 +156,16 @@ def test_onnx_says_what_torch_says(size, tmp_path, batch):
     for found, wanted in zip(session.run(depth_m.numpy()), expected, strict=True):
         np.testing.assert_allclose(found, wanted.numpy(), atol=1e-3)
     assert session.facts['focal_px'] == '80.0'
-    assert load_depth_net(tmp_path / 'net.onnx').focal_px == 80.0
+    loaded = DepthNetwork(session)
+    assert (loaded.focal_px, loaded.is_close) == (80.0, False)
+
+
+def test_a_network_of_near_looks_says_where_people_are_to_be_shown(tmp_path):
+    network = DepthNet(replace(TINY, shown_at_m=1.75))
+    export_onnx(network, tmp_path / 'net.onnx')
+    loaded = DepthNetwork(load_onnx(tmp_path / 'net.onnx'))
+    assert loaded.is_close
+    assert loaded.enlarged(3.5) == 2.0
 
 
 def test_relief_is_the_same_near_and_far():
@@ -217,6 +230,7 @@ def take_many(stream):
 
 
 def test_processes_that_end_are_told(tmp_path):
-    stream = SceneStream(1, 0, SIZE, 80.0, tmp_path / 'no_motions.npz')
+    kind = SceneKind(SIZE, 80.0, mocap=tmp_path / 'no_motions.npz')
+    stream = SceneStream(1, 0, kind)
     with stream, pytest.raises(ShardError, match='1 ended'):
         take_many(stream)
