@@ -180,7 +180,7 @@ def _json_detector(folder: Path | None) -> KeypointDetector:
 
 def _network(word: str) -> OnnxSource | DepthNetDetector:
     from pop_core.keypoints.decoders import DECODERS
-    from pop_core.keypoints.depth_net import load_depth_net
+    from pop_core.keypoints.depth_net import depth_net_of
     from pop_core.keypoints.depth_network import is_depth_net
     from pop_core.keypoints.onnx_detector import source_of
     from pop_core.keypoints.onnx_session import OnnxSession, load_network
@@ -197,5 +197,5 @@ def _network(word: str) -> OnnxSource | DepthNetDetector:
         raise SourceError(f'keypoints: expected {SOURCES}, found {path}, which {why}')
     session = load_network(path)
     if decoder is None and is_depth_net(session):
-        return load_depth_net(path)
+        return depth_net_of(session, path)
     return source_of(session, decoder)

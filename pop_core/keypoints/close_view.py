@@ -2,7 +2,8 @@
 
 Enlarging alone would make giants of far people. Their depth is shifted instead of scaled, so that
 the relief of a body stays what it is: somebody at 4 m who is shown at 2 m, with twice the pixels,
-is as large, as thick and as far from the wall as before. Who is too near is shown farther alike.
+is as large, as thick and as far from the wall as before. A network of near looks, which knows one
+distance, is shown near people farther alike.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ from pop_core.keypoints.depth_network import EMBEDDED, DepthNetwork, close_path
 from pop_core.keypoints.depth_votes import Cells, DepthNetConfig
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.joint_surface import joints_with_skin
-from pop_core.keypoints.onnx_session import load_network
+from pop_core.keypoints.onnx_session import OnnxSession, load_network
 from pop_core.keypoints.vote_fusion import VotedPerson, fuse_votes
 from pop_core.rgbd import RgbdFrame
 
@@ -147,10 +147,10 @@ class DepthNetDetector:
         if len(own) < FEWEST_CELLS:
             return None
         closer, both = fuse_votes(own), fuse_votes(own.joined(looks[index].cells))
-        if not np.isfinite(both.joints).all():
-            return None
         # Near looks know better, but what deceives one look seldom deceives both.
         score = closer.score ** NEAR_SHARE * looks[index].score ** (1.0 - NEAR_SHARE)
+        if not np.isfinite([score, *both.sigma_m, *both.joints.ravel()]).all():
+            return None
         return Look(
             replace(closer, joints=both.joints, sigma_m=both.sigma_m, visible=both.visible),
             own, view, score)
@@ -175,9 +175,20 @@ def load_depth_net(
     Raises:
         NetworkShapeError: If there is no such file or it is no network of this kind.
     """
+    return depth_net_of(load_network(path), path, config)
+
+
+def depth_net_of(
+    session: OnnxSession, path: Path, config: DepthNetConfig | None = None
+) -> DepthNetDetector:
+    """Return the detector of a loaded file, with the network of near looks that lies beside it.
+
+    Raises:
+        NetworkShapeError: If one of them is no network of this kind.
+    """
     beside = close_path(path)
     close = DepthNetwork(load_network(beside)) if beside.is_file() else None
-    return DepthNetDetector(DepthNetwork(load_network(path)), config, close)
+    return DepthNetDetector(DepthNetwork(session), config, close)
 
 
 def _other_look(network: DepthNetwork, wanted: str) -> NetworkShapeError:

@@ -21,7 +21,7 @@ OUTPUTS = (('parts', N_CLASSES), ('votes', 45), ('log_sigma', 15), ('visible', 1
 EXPECTED = ('a depth network of this package: depth_m (1, 1, ?, ?) float32 -> '
             + ', '.join(f'{name} (1, {channels}, ?, ?)' for name, channels in OUTPUTS))
 FOCAL_PX = (40.0, 1000.0)  # no network of this kind looks finer or coarser
-SHOWN_M = (0.5, 20.0)
+SHOWN_M = (1.0, 20.0)  # nearer, what stands before people would be shown behind the camera
 
 
 class DepthNetwork:

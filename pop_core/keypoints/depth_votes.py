@@ -36,10 +36,10 @@ class DepthNetConfig:
         about='Smallest visible surface, as seen from the camera, that makes a person.')
     min_candidate_score: float = setting(
         0.09, minimum=0.0, maximum=1.0,
-        about='Smallest score that earns a near look of 4 ms: less cannot become a person.')
+        about='Smallest score of the first look that earns a near one, which takes 3 ms.')
     min_person_score: float = setting(
         0.30, minimum=0.0, maximum=1.0,
-        about='Smallest score of a person: of surface and surest joints, in both looks.')
+        about='Smallest score of a person: of surface and surest joints, in the near look first.')
     trunk_gap_m: float = setting(
         0.30, unit='m', minimum=0.05, maximum=1.0,
         about='Two trunks nearer to each other than this are the same person.')

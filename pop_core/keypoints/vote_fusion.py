@@ -92,12 +92,14 @@ def fuse_votes(cells: Cells) -> VotedPerson:
     """Return the person that cells agree on, votes weighted by the certainty they claim.
 
     Votes are averaged with weights 1 / sigma^4: errors of neighbouring cells are alike, so that
-    many doubtful votes are worth less than 1 / sigma^2 says. Those of a seen joint count by the
+    many doubtful votes are worth less than 1 / sigma^2 says. Cells count by the surface they show,
+    so that two looks at one person weigh alike. Those of a seen joint count by the
     probability that their cell shows a part which ends there; those far from the others count
     less (Huber).
     """
     own = STRANGER + cells.part @ BORDERING.T
-    weight = cells.probability[:, None] / cells.sigma_m**4 * own ** (2.0 * cells.visible)
+    shown = (cells.probability * cells.area_m2)[:, None]
+    weight = shown / cells.sigma_m**4 * own ** (2.0 * cells.visible)
     mean = _weighted_mean(cells.joints, weight)
     robust = weight
     for _ in range(ROUNDS):

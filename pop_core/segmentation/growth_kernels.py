@@ -46,7 +46,7 @@ def segment(depth, rendered, own, gamma, tolerance, blur, blur_per_square, growt
         own: (h,w) pixels that may be the person's.
         gamma: Depth step that is still one surface [m].
         tolerance: Distance from the body's depth that is still the body [m].
-        blur: What noise adds to both [m].
+        blur: What noise adds to both, no more than the tolerance itself [m].
         blur_per_square: Growth of it with the square of depth [1/m].
         growth: How wide the rim is [m px]: over depth, a number of pixels.
         nearest: Depth that nobody is nearer than [m].
@@ -60,7 +60,7 @@ def segment(depth, rendered, own, gamma, tolerance, blur, blur_per_square, growt
             out[y, x] = (
                 rendered[y, x] != np.inf and own[y, x]
                 and abs(depth[y, x] - rendered[y, x])
-                < tolerance + blur + blur_per_square * rendered[y, x] * rendered[y, x])
+                < tolerance + min(blur + blur_per_square * depth[y, x] ** 2, tolerance))
     queue, tail = _listed(out)
     head = 0
     while head < tail:
@@ -70,7 +70,7 @@ def segment(depth, rendered, own, gamma, tolerance, blur, blur_per_square, growt
             ny, nx = _beside(y, x, k)
             if not _may_join(ny, nx, out, own):
                 continue
-            noise = blur + blur_per_square * depth[y, x] * depth[y, x]
+            noise = min(blur + blur_per_square * depth[y, x] ** 2, tolerance)
             if not abs(depth[ny, nx] - depth[y, x]) < gamma + noise:
                 continue
             squared, body_y, body_x = nearest_pixel(row, ny, nx, farthest)

@@ -20,7 +20,7 @@ SOON = 2  # frames from one look to the next while somebody is not followed well
 RATE_HZ = 30.0
 # A camera that is slower leaves time to wait for a look, for this share of what lies between two
 # of its frames: whoever is followed is drawn to where their limbs are, not to where they were.
-WAITING_S, WAITING_SHARE = 0.05, 1.0 / 3.0
+WAITING_S, WAITING_SHARE = 0.058, 1.0 / 3.0  # 17 Hz: no usual rate is near it
 LONGEST_S = 1000.0  # that is counted: before the first frame lies an eternity
 
 
@@ -51,14 +51,17 @@ class Gap:
         """Return whether it is the camera that leaves people unseen, and not we."""
         return self.of_camera_s > LONG_GAP_S
 
-
     @property
     def patience_s(self) -> float:
-        """Return for how long a frame may wait for what is made beside the following [s]."""
+        """Return for how long a frame may wait for what is made beside the following [s].
+
+        Whoever had to leave frames out has no time to wait.
+        """
         if self.is_of_slow_camera:
             return math.inf
-        return WAITING_SHARE * self.of_camera_s if self.of_camera_s > WAITING_S else 0.0
-
+        if self.skipped > 0 or self.of_camera_s < WAITING_S:
+            return 0.0
+        return WAITING_SHARE * self.of_camera_s
 
 class DetectionSchedule:
     """Decides, frame by frame, whether to ask the detector."""

@@ -1,7 +1,8 @@
 """Training scenes as a near look shows them: one person each, at one size, or nobody.
 
 The same scenes as for the whole image, drawn finer; each person in them is shown as
-`pop_core.keypoints.close_view` will show them, around a guess that errs as first looks err.
+`pop_core.keypoints.close_view` will show them, around a guess that errs as first looks err. Holes
+stay holes here: the detector fills single ones from beside.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from pop_core.synthesis.training_scenes import TrainingScene, TrainingScenes
 FINE_FOCAL_PX = 400.0
 FINE_SIZE = (480, 400)
 FEWEST_SHOWN = 40  # pixels of a near look that show the person; less is no look's subject
-NOBODY_SHARE = 0.12
-NOBODY_M = (0.8, 6.0)
+NOBODY_SHARE = 0.12  # of looks that are aimed at something else than a person
+NOBODY_M = (0.8, 6.0)  # where that stands
 GUESSED_M = 0.10   # how far the middle of a first guess lies beside the person's
 SURFACE_M = 0.06   # how far its depth lies before or behind
 
@@ -58,19 +59,18 @@ class CloseScenes:
         while True:
             scene = self.scenes.draw()
             for index in range(len(scene.people)):
-                shown = self._look_at(scene, index)
+                own = scene.depth_m[(scene.owner == index) & np.isfinite(scene.depth_m)]
+                if not len(own):
+                    continue
+                shown = self._look_at(scene, index, float(np.median(own)))
                 if np.count_nonzero(shown.owner == index) >= FEWEST_SHOWN:
                     yield shown
             if self._rng.random() < NOBODY_SHARE * max(len(scene.people), 1):
                 yield self._look_at_nobody(scene)
 
-    def _look_at(self, scene: TrainingScene, index: int) -> TrainingScene:
-        own = scene.depth_m[scene.owner == index]
-        own = own[np.isfinite(own)]
-        surface_m = float(np.median(own)) if len(own) else np.nan
+    def _look_at(self, scene: TrainingScene, index: int, surface_m: float) -> TrainingScene:
+        """Return a look around the joints of a person who lie in the image."""
         points = scene.people[index].shared_points
-        if not surface_m > BEFORE_M / 4:
-            surface_m = float(np.median(points[:, 2]))
         rays = np.clip(points[:, :2] / np.maximum(points[:, 2:], 0.1), *_border(scene.camera))
         return self._shown(scene, (rays.min(axis=0) + rays.max(axis=0)) / 2, surface_m)
 

@@ -15,7 +15,7 @@ from pop_core.training.augmentation import cropped, varied
 from pop_core.training.curves import save_curves
 from pop_core.training.scene_pool import ScenePool
 from pop_core.training.scene_stream import SceneStream
-from pop_core.training.scene_writer import SHARD_SCENES, SceneKind
+from pop_core.training.scene_writer import MARGIN_PX, SHARD_SCENES, SceneKind
 from pop_core.training.shards import Shard, ShardError, load_shard, shard_paths
 from pop_core.training.targets import Batch, make_targets
 from pop_core.training.trainer import Trainer
@@ -175,13 +175,14 @@ def _fitting(path: Path, size: tuple[int, int]) -> Shard:
     """Return the scenes of a file.
 
     Raises:
-        ShardError: If they are smaller than the network's input.
+        ShardError: If they were not drawn for a network of this size.
     """
     shard = load_shard(path)
     height, width = shard.depth_mm.shape[1:]
-    if width < size[0] or height < size[1]:
+    wanted = size[0] + MARGIN_PX, size[1] + MARGIN_PX
+    if (width, height) != wanted:
         raise ShardError(
-            f'{path}: expected scenes of at least {size[0]}x{size[1]}, found {width}x{height}: '
+            f'{path}: expected scenes of {wanted[0]}x{wanted[1]}, found {width}x{height}: '
             'draw them with the same --size')
     return shard
 

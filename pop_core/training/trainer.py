@@ -142,10 +142,18 @@ class Trainer:
     def load(self, path: Path) -> None:
         """Go on from a file written by `save`, or begin with the weights of `save_weights`.
 
+        Weights of a network for another look are a beginning: what they learned is not counted.
+
         Raises:
-            CheckpointError: If it is no checkpoint of a network of this size.
+            CheckpointError: If it is no checkpoint of a network of this size, or one to go on from
+                that was trained for another look.
         """
         state = read_checkpoint(path)
+        is_same = NetworkConfig(**state['network_config']) == self.network.config
+        if 'network' in state and not is_same:
+            raise CheckpointError(
+                f'{path}: expected a training of {self.network.config} to go on with, '
+                f'found one of {state["network_config"]}')
         try:
             self.averaged.load_state_dict(state['averaged'])
             self.network.load_state_dict(state.get('network', state['averaged']))
@@ -155,8 +163,9 @@ class Trainer:
             raise CheckpointError(
                 f'{path}: expected weights of a network as {self.network.config}, found '
                 f'{state["network_config"]}') from error
-        self.steps, self.images = state.get('steps', 0), state['images']
-        self.history = list(state['history'])
+        if is_same:
+            self.steps, self.images = state.get('steps', 0), state['images']
+            self.history = list(state['history'])
 
 
 def load_network(path: Path) -> DepthNet:

@@ -1,5 +1,7 @@
 """People out of a depth network's maps: perfect maps give back the truth."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.depth_maps import shown_scene, truth_maps
@@ -143,6 +145,33 @@ def test_both_looks_say_how_surely_somebody_is_there(scenes):
         assert low <= look.score <= high
         scores.append(look.score)
     assert scores == sorted(scores)
+
+
+class Shifted(PerfectNetwork):
+    """A network that sees all joints beside where they are, and says how sure it is."""
+
+    def __init__(self, scene, shift_m, sigma_m, *, is_close):
+        super().__init__(scene, is_close=is_close)
+        self.shift_m, self.sigma_m = shift_m, sigma_m
+
+    def cells(self, shown_m, view, min_probability):
+        """Return the cells with other votes."""
+        cells = super().cells(shown_m, view, min_probability)
+        return replace(cells, joints=cells.joints + [self.shift_m, 0.0, 0.0],
+                       sigma_m=np.full_like(cells.sigma_m, self.sigma_m))
+
+
+@pytest.mark.parametrize(('first_m', 'near_m', 'expected_m'), [
+    (0.02, 0.08, 0.0), (0.08, 0.02, 0.04), (0.04, 0.04, 0.02)])
+def test_joints_are_told_by_the_surer_look(scenes, first_m, near_m, expected_m):
+    scene = next(scene for scene in scenes if detections(scene))
+    detector = DepthNetDetector(
+        Shifted(scene, 0.0, first_m, is_close=False),
+        close=Shifted(scene, 0.04, near_m, is_close=True))
+    first = detector.first_look(frame_of(scene))
+    look = detector.closer(frame_of(scene), first, 0)
+    offset = np.median(look.person.joints[:, 0] - first[0].person.joints[:, 0])
+    assert offset == pytest.approx(expected_m, abs=0.012)
 
 
 def test_an_empty_image_shows_nobody(scenes):

@@ -2,11 +2,13 @@
 
 from itertools import pairwise
 
+import cv2
 import numpy as np
 import pytest
 
 from pop_core.geometry.camera import Camera
-from pop_core.keypoints.close_view import BEFORE_M, NetworkView
+from pop_core.keypoints.canonical_depth import canonical_view
+from pop_core.keypoints.close_view import BEFORE_M, NetworkView, close_depth, close_view
 from pop_core.synthesis.training_scenes import TrainingScene
 from pop_core.training.close_scenes import FEWEST_SHOWN, seen_from_near
 from pop_core.training.scene_writer import MARGIN_PX, SceneKind, scene_stream
@@ -71,6 +73,24 @@ def test_depth_is_shifted_and_not_scaled():
     # One pixel of the look is one of the fine image here: 2 x 50 px of focal length.
     step = np.flatnonzero(np.diff(look.depth_m[40]) > 0.2)
     assert step.tolist() == [47]
+
+
+@pytest.mark.parametrize('enlarged', [0.7, 1.6])
+def test_looks_to_learn_from_are_those_that_the_detector_shows(enlarged):
+    rng = np.random.default_rng(4)
+    camera = Camera(160, 120, 150.0, 150.0, 70.3, 66.1)
+    depth_m = cv2.GaussianBlur(
+        rng.uniform(1.0, 4.0, (120, 160)).astype(np.float32), (0, 0), 12.0) * 2.0 - 2.0
+    nobody = np.full(depth_m.shape, -1, dtype=np.int8)
+    scene = TrainingScene(depth_m, nobody, nobody, (), camera)
+    joints = np.array([[-0.3, -0.4, 3.0], [0.4, 0.3, 3.0]])
+    fine = canonical_view(camera, camera.fx)
+    view = close_view(80.0, enlarged, joints, 3.0, fine)
+    shown_m = np.nan_to_num(seen_from_near(scene, view).depth_m)
+    expected_m = close_depth(depth_m, fine, view)
+    assert (expected_m > 0).mean() > 0.2
+    # Two roundings may choose the next pixel, which differs little here.
+    assert np.mean(np.abs(shown_m - expected_m) < 0.02) > 0.97
 
 
 def test_what_is_too_near_beyond_the_border_or_not_measured_is_missing():

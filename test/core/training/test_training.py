@@ -129,6 +129,21 @@ def test_a_run_that_went_on_is_a_run_that_never_stopped(batch, tmp_path):
         torch.testing.assert_close(resumed.averaged.state_dict()[name], value)
 
 
+def test_a_training_of_another_look_is_not_gone_on_with(batch, tmp_path):
+    learner = trainer()
+    learner.step(batch)
+    learner.save(tmp_path / 'checkpoint.pt')
+    learner.save_weights(tmp_path / 'weights.pt')
+    close = Trainer(torch.device('cpu'), replace(TINY, shown_at_m=2.0))
+    with pytest.raises(CheckpointError, match=r'expected a training of .*shown_at_m=2\.0'):
+        close.load(tmp_path / 'checkpoint.pt')
+    close.load(tmp_path / 'weights.pt')
+    assert (close.images, close.history) == (0, [])
+    learned = learner.averaged.state_dict()
+    for name, value in close.averaged.state_dict().items():
+        torch.testing.assert_close(value, learned[name], atol=1e-2, rtol=1e-2)
+
+
 def test_weights_in_half_precision_are_small_and_say_nearly_the_same(batch, tmp_path):
     learner = trainer()
     learner.step(batch)
@@ -220,7 +235,7 @@ def test_weights_of_another_size_are_told(tmp_path):
 def test_scenes_smaller_than_the_networks_input_are_told(small_scenes, tmp_path):
     save_shard(pack(small_scenes[:2]), tmp_path / 'scenes' / 'a.npz')
     run = RunConfig(tmp_path / 'run', 0.01, size=(192, 160), scenes=tmp_path / 'scenes')
-    with pytest.raises(ShardError, match='at least 192x160, found 112x80'):
+    with pytest.raises(ShardError, match='scenes of 208x176, found 112x80'):
         train(trainer(), run, lambda _: None)
 
 
