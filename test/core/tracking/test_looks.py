@@ -38,6 +38,7 @@ class Slow:
         self.waiting: list[tuple[Future, Seen]] = []
         self.looks = 0
         self.is_at_once = False
+        self.soon_s = math.inf
         self.watcher: Watcher | None = None
 
     def submit(self, work: Callable[..., Seen], *frames: RgbdFrame) -> Future:
@@ -46,6 +47,8 @@ class Slow:
         self.waiting.append((future, work(self.watcher, *frames)))
         if self.is_at_once:
             self.finish()
+        elif self.soon_s < math.inf:
+            Timer(self.soon_s, self.finish).start()
         return future
 
     def finish(self) -> None:
@@ -117,6 +120,28 @@ def test_somebody_new_begins_in_the_frame_that_was_looked_at(
     slow.finish()
     stage.show(person, aside)
     assert [body.track.id for body in stage.show(person, aside)] == [0, 1]
+
+
+def test_a_frame_of_a_slow_camera_waits_for_its_own_look(
+    stage: Stage, slow: Slow, person: BodyParameters
+) -> None:
+    slow.soon_s = 0.005  # 15 Hz leave 22 ms
+    aside = person.replaced(transl=person.transl + [-0.9, 0.0, 0.2])
+    looks = slow.looks
+    while slow.looks == looks:
+        bodies = stage.show(person, aside)
+    assert len(bodies) == 2
+
+
+def test_a_camera_that_is_kept_up_with_badly_waits_for_no_look(
+    stage: Stage, slow: Slow, person: BodyParameters
+) -> None:
+    slow.soon_s = 0.005
+    aside = person.replaced(transl=person.transl + [-0.9, 0.0, 0.2])
+    looks = slow.looks
+    while slow.looks == looks:
+        bodies = stage.show(person, aside, skipped=1)
+    assert len(bodies) == 1
 
 
 @pytest.mark.parametrize('is_reset', [True, False], ids=['reset', 'jump back in time'])
