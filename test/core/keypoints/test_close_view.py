@@ -6,6 +6,7 @@ import pytest
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.canonical_depth import LARGEST_SIDE, canonical_view
 from pop_core.keypoints.close_view import (
+    BEFORE_M,
     FINEST,
     SHOWN_AT_M,
     SIDES_PX,
@@ -48,6 +49,20 @@ def test_somebody_far_is_shown_as_large_and_as_thick_at_the_near_depth(z_m):
     np.testing.assert_allclose(shown[:2, 2], SHOWN_AT_M)
     np.testing.assert_allclose(shown[1] - shown[0], ends[1] - ends[0], atol=1e-9)
     assert shown[2, 2] - shown[0, 2] == pytest.approx(0.2)
+
+
+def test_somebody_too_near_for_a_network_of_near_looks_is_shown_farther():
+    joints, surface_m = somebody(1.0)
+    fine = canonical_view(VGA, FINEST * FOCAL_PX, FINEST * LARGEST_SIDE)
+    view = close_view(FOCAL_PX, 0.5, joints, surface_m, fine)
+    ends = np.array([[-0.3, -0.4, 1.0], [0.3, 0.4, 1.0], [0.0, 0.0, 1.2]])
+    shown = view.from_camera(ends)
+    np.testing.assert_allclose(shown[:, 2], [2.0, 2.0, 2.2])
+    np.testing.assert_allclose(shown[1] - shown[0], ends[1] - ends[0], atol=1e-9)
+    np.testing.assert_allclose(view.to_camera(shown), ends, atol=1e-12)
+    shown_m = close_depth(np.full((480, 640), 1.0, np.float32), fine, view)
+    np.testing.assert_allclose(shown_m[shown_m > 0], 2.0, atol=1e-6)
+    assert view.nearest_m == pytest.approx(2.0 - BEFORE_M)
 
 
 def test_somebody_near_is_shown_where_they_are():
