@@ -8,7 +8,7 @@ shows the whole image and finds who is where, then each of them is looked at fro
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -146,14 +146,12 @@ class DepthNetDetector:
         own = cells.chosen(nearest_trunk(cells, trunks, self.config.reach_m) == index)
         if len(own) < FEWEST_CELLS:
             return None
-        closer, both = fuse_votes(own), fuse_votes(own.joined(looks[index].cells))
+        closer = fuse_votes(own.joined(looks[index].cells), shown=own)
         # Near looks know better, but what deceives one look seldom deceives both.
         score = closer.score ** NEAR_SHARE * looks[index].score ** (1.0 - NEAR_SHARE)
-        if not np.isfinite([score, *both.sigma_m, *both.joints.ravel()]).all():
+        if not np.isfinite([score, *closer.sigma_m, *closer.joints.ravel()]).all():
             return None
-        return Look(
-            replace(closer, joints=both.joints, sigma_m=both.sigma_m, visible=both.visible),
-            own, view, score)
+        return Look(closer, own, view, score)
 
     def views(self, camera: Camera) -> Views:
         """Return the views of a camera; kept while the camera stays the same."""

@@ -88,7 +88,7 @@ class VotedPerson:
         return np.asarray(self.joints[TRUNK].mean(axis=0))
 
 
-def fuse_votes(cells: Cells) -> VotedPerson:
+def fuse_votes(cells: Cells, shown: Cells | None = None) -> VotedPerson:
     """Return the person that cells agree on, votes weighted by the certainty they claim.
 
     Votes are averaged with weights 1 / sigma^4: errors of neighbouring cells are alike, so that
@@ -96,10 +96,14 @@ def fuse_votes(cells: Cells) -> VotedPerson:
     so that two looks at one person weigh alike. Those of a seen joint count by the
     probability that their cell shows a part which ends there; those far from the others count
     less (Huber).
+
+    Args:
+        cells: Cells that show the person, in one look or two.
+        shown: Those of them that tell how much of the person is seen; all where none are given.
     """
     own = STRANGER + cells.part @ BORDERING.T
-    shown = (cells.probability * cells.area_m2)[:, None]
-    weight = shown / cells.sigma_m**4 * own ** (2.0 * cells.visible)
+    surface = (cells.probability * cells.area_m2)[:, None]
+    weight = surface / cells.sigma_m**4 * own ** (2.0 * cells.visible)
     mean = _weighted_mean(cells.joints, weight)
     robust = weight
     for _ in range(ROUNDS):
@@ -110,9 +114,10 @@ def fuse_votes(cells: Cells) -> VotedPerson:
     total = robust.sum(axis=0)
     sigma = (robust * cells.sigma_m).sum(axis=0) / total
     visible = (robust * cells.visible).sum(axis=0) / total
+    shown = cells if shown is None else shown
     return VotedPerson(
-        mean, sigma, visible, float(cells.probability.mean()), float(cells.area_m2.sum()),
-        float(np.median(cells.depth_m)))
+        mean, sigma, visible, float(shown.probability.mean()), float(shown.area_m2.sum()),
+        float(np.median(shown.depth_m)))
 
 
 def _weighted_mean(
