@@ -227,9 +227,12 @@ def test_a_damaged_checkpoint_is_told(tmp_path):
 
 def test_weights_of_another_size_are_told(tmp_path):
     trainer().save(tmp_path / 'a.pt')
+    trainer().save_weights(tmp_path / 'w.pt')
     other = Trainer(torch.device('cpu'))
-    with pytest.raises(CheckpointError, match='expected weights of a network'):
+    with pytest.raises(CheckpointError, match='expected a training of'):
         other.load(tmp_path / 'a.pt')
+    with pytest.raises(CheckpointError, match='expected weights of a network'):
+        other.load(tmp_path / 'w.pt')
 
 
 def test_scenes_smaller_than_the_networks_input_are_told(small_scenes, tmp_path):
