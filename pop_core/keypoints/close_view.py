@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Float32, Int
 
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.canonical_depth import SIDE_MULTIPLE, CanonicalView
@@ -58,6 +58,29 @@ class NetworkView:
         return np.concatenate([xy, shown_z], axis=-1)
 
 
+def centred_camera(
+    ray: Float[np.ndarray, '2'], width: int, height: int, focal_px: float, enlarged: float
+) -> Camera:
+    """Return the pinhole a network believes in that has a real ray in its middle.
+
+    Args:
+        ray: The ray's x/z and y/z.
+        width: Width of the image [px].
+        height: Height of the image [px].
+        focal_px: The network's focal length.
+        enlarged: How many times as long as that the real one is.
+    """
+    cx, cy = np.array([width - 1, height - 1]) / 2 - ray * (focal_px * enlarged)
+    return Camera(width, height, focal_px, focal_px, float(cx), float(cy))
+
+
+def border_rays(camera: Camera) -> Float[np.ndarray, '2 2']:
+    """Return the least and the greatest ray (x/z, y/z) of an image."""
+    last = np.array([camera.width, camera.height]) - 1
+    focal, centre = np.array([camera.fx, camera.fy]), np.array([camera.cx, camera.cy])
+    return np.asarray((np.array([[0, 0], last]) - centre) / focal)
+
+
 def close_view(
     focal_px: float, enlarged: float, joints: Float[np.ndarray, 's 3'], surface_m: float,
     fine: CanonicalView,
@@ -73,17 +96,13 @@ def close_view(
     """
     rays = joints[:, :2] / joints[:, 2:]
     margin = MARGIN_M / surface_m
-    seen = fine.camera
-    last = np.array([seen.width, seen.height]) - 1
-    border = (np.array([[0, 0], last]) - [seen.cx, seen.cy]) / seen.fx
-    low = np.maximum(rays.min(axis=0) - margin, border[0])
-    high = np.minimum(rays.max(axis=0) + margin, border[1])
-    scale = focal_px * enlarged
-    columns, rows = (
+    least, greatest = border_rays(fine.camera)
+    low = np.maximum(rays.min(axis=0) - margin, least)
+    high = np.minimum(rays.max(axis=0) + margin, greatest)
+    width, height = (
         int(np.clip(SIDE_MULTIPLE * np.ceil(extent / SIDE_MULTIPLE), *SIDES_PX))
-        for extent in (high - low) * scale)
-    centre = np.array([columns - 1, rows - 1]) / 2 - (low + high) / 2 * scale
-    camera = Camera(columns, rows, focal_px, focal_px, float(centre[0]), float(centre[1]))
+        for extent in (high - low) * focal_px * enlarged)
+    camera = centred_camera((low + high) / 2, width, height, focal_px, enlarged)
     shown_at_m = surface_m / enlarged
     nearest_m = shown_at_m - BEFORE_M if enlarged != 1.0 else 0.0
     return NetworkView(camera, enlarged, surface_m - shown_at_m, nearest_m)
@@ -101,16 +120,18 @@ def close_depth(
     """
     shown = view.camera
     out = np.empty((shown.height, shown.width), dtype=np.float32)
-    rows, columns = (
-        np.rint((np.arange(size) - centre) * scale + fine_centre).astype(np.int64)
-        for size, centre, fine_centre, scale in (
-            (shown.height, shown.cy, fine.camera.cy, _ratio(fine, view)),
-            (shown.width, shown.cx, fine.camera.cx, _ratio(fine, view))))
+    rows, columns = shown_pixels(fine.camera, view)
     read_depth(
         depth_m, fine.source_v, fine.source_u, rows, columns, view.nearer_m, view.nearest_m, out)
     return out
 
 
-def _ratio(fine: CanonicalView, view: NetworkView) -> float:
-    """Return how many pixels of a fine view one of a network's view spans."""
-    return fine.camera.fx / (view.camera.fx * view.enlarged)
+def shown_pixels(
+    fine: Camera, view: NetworkView
+) -> tuple[Int[np.ndarray, 'H'], Int[np.ndarray, 'W']]:
+    """Return the rows and the columns of a fine image that a view shows; some may lie outside."""
+    shown = view.camera
+    ratio = fine.fx / (shown.fx * view.enlarged)
+    rows = (np.arange(shown.height) - shown.cy) * ratio + fine.cy
+    columns = (np.arange(shown.width) - shown.cx) * ratio + fine.cx
+    return np.rint(rows).astype(np.int64), np.rint(columns).astype(np.int64)

@@ -36,7 +36,7 @@ class DepthNetConfig:
         about='Smallest visible surface, as seen from the camera, that makes a person.')
     min_candidate_score: float = setting(
         0.09, minimum=0.0, maximum=1.0,
-        about='Smallest score of the first look that earns a near one, which takes 3 ms.')
+        about='Smallest score of the first look that earns a near one.')
     min_person_score: float = setting(
         0.30, minimum=0.0, maximum=1.0,
         about='Smallest score of a person: of surface and surest joints, in the near look first.')

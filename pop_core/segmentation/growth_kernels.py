@@ -37,6 +37,12 @@ def _may_join(y, x, inside, allowed):
 
 
 @njit(cache=True, nogil=True)
+def _noise(z, blur, blur_per_square, most):
+    """Return what noise may add at a depth [m]."""
+    return min(blur + blur_per_square * z * z, most)
+
+
+@njit(cache=True, nogil=True)
 def segment(depth, rendered, own, gamma, tolerance, blur, blur_per_square, growth, nearest, out):
     """Fill `out` with the measured pixels of a body: those it covers, and the rim joined to them.
 
@@ -60,7 +66,7 @@ def segment(depth, rendered, own, gamma, tolerance, blur, blur_per_square, growt
             out[y, x] = (
                 rendered[y, x] != np.inf and own[y, x]
                 and abs(depth[y, x] - rendered[y, x])
-                < tolerance + min(blur + blur_per_square * depth[y, x] ** 2, tolerance))
+                < tolerance + _noise(depth[y, x], blur, blur_per_square, tolerance))
     queue, tail = _listed(out)
     head = 0
     while head < tail:
@@ -70,7 +76,7 @@ def segment(depth, rendered, own, gamma, tolerance, blur, blur_per_square, growt
             ny, nx = _beside(y, x, k)
             if not _may_join(ny, nx, out, own):
                 continue
-            noise = min(blur + blur_per_square * depth[y, x] ** 2, tolerance)
+            noise = _noise(depth[y, x], blur, blur_per_square, tolerance)
             if not abs(depth[ny, nx] - depth[y, x]) < gamma + noise:
                 continue
             squared, body_y, body_x = nearest_pixel(row, ny, nx, farthest)

@@ -63,6 +63,7 @@ class Gap:
             return 0.0
         return WAITING_SHARE * self.of_camera_s
 
+
 class DetectionSchedule:
     """Decides, frame by frame, whether to ask the detector."""
 

@@ -213,9 +213,8 @@ class Looks:
         # The detector answers one question at a time.
         made = self._lookout.submit(look_for_people, frame, undistorted)
         self.forget()
-        if patience_s < math.inf:
-            wait([made], patience_s)
-        if patience_s == math.inf or made.done():
+        wait([made], None if patience_s == math.inf else patience_s)
+        if made.done():
             return Look(undistorted, made.result())
         self._made, self._frame = made, undistorted
         return None

@@ -158,8 +158,7 @@ class BodyTracker:
         if self._schedule.is_due(
                 self._tracks, self._gap, is_busy=self._fresh.is_busy, is_late=is_late,
                 is_looking=self._looks.is_busy and patience_s < np.inf):
-            look = (
-                self._looks.look(self.pipeline, frame, seen, patience_s=patience_s) or look)
+            look = self._looks.look(self.pipeline, frame, seen, patience_s=patience_s) or look
         if look is None and self._looks.is_busy:
             # A body found anew is compared by keypoints too.
             self._fresh.put_off()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -14,8 +15,8 @@ from pop_core.training.export import export_onnx
 from pop_core.training.network import NetworkConfig
 from pop_core.training.run import RunConfig, train
 from pop_core.training.run import validate as validated
-from pop_core.training.scene_writer import SceneKind, write_shards
-from pop_core.training.trainer import TrainConfig, Trainer, load_network, read_checkpoint
+from pop_core.training.scene_writer import SHARD_SCENES, SceneKind, write_shards
+from pop_core.training.trainer import TrainConfig, Trainer, config_of, load_network, read_checkpoint
 
 BAD_INPUT = 2
 SIZES = {
@@ -43,14 +44,16 @@ def scenes(
 ) -> None:
     """Draw training scenes into packed files; files that are there already are kept.
 
-    About 60 scenes a second and core, 110 kB each; of --size close (each person from near, for the
-    second network) 35, 76 kB each. Another --seed gives validation scenes.
+    A scene takes 110 kB, of --size close (each person from near, for the second network) 76 kB.
+    Another --seed gives validation scenes.
     """
-    network = _network(size)
+    network, begin, before = _network(size), time.monotonic(), None
     for done in write_shards(
             out, count, seed=seed, workers=workers, kind=SceneKind(
                 IMAGES[size], network.focal_px, network.shown_at_m, mocap)):
-        typer.echo(f'{done} scenes in {out}')
+        before = done - SHARD_SCENES if before is None else before
+        rate = (done - before) / (time.monotonic() - begin)
+        typer.echo(f'{done} of {count} scenes in {out}, {rate:.0f}/s')
 
 
 @app.command(name='train')
@@ -105,7 +108,7 @@ def validate(
     validation: Annotated[Path, typer.Option('--validation', help='Packed scenes.')],
 ) -> None:
     """Print the figures of a network, cell by cell, with people told apart by truth."""
-    config = NetworkConfig(**read_checkpoint(checkpoint)['network_config'])
+    config = config_of(read_checkpoint(checkpoint), checkpoint)
     trainer = Trainer(torch.device('cpu'), config)
     trainer.load(checkpoint)
     size = next(IMAGES[name] for name, known in SIZES.items() if known == config)
@@ -125,7 +128,7 @@ def export(
     state = read_checkpoint(checkpoint)
     export_onnx(load_network(checkpoint), out, f'after {state["images"]} images')
     if weights is not None:
-        trainer = Trainer(torch.device('cpu'), NetworkConfig(**state['network_config']))
+        trainer = Trainer(torch.device('cpu'), config_of(state, checkpoint))
         trainer.load(checkpoint)
         trainer.save_weights(weights)
     typer.echo(f'{out}: {out.stat().st_size / 1e6:.1f} MB')

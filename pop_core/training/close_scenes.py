@@ -13,8 +13,13 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from pop_core.geometry.camera import Camera
-from pop_core.keypoints.close_view import BEFORE_M, NetworkView
+from pop_core.keypoints.close_view import (
+    BEFORE_M,
+    NetworkView,
+    border_rays,
+    centred_camera,
+    shown_pixels,
+)
 from pop_core.synthesis.training_scenes import TrainingScene, TrainingScenes
 
 # Scenes are drawn with this focal length, about a sensor's own: what a near look can resolve.
@@ -71,7 +76,8 @@ class CloseScenes:
     def _look_at(self, scene: TrainingScene, index: int, surface_m: float) -> TrainingScene:
         """Return a look around the joints of a person who lie in the image."""
         points = scene.people[index].shared_points
-        rays = np.clip(points[:, :2] / np.maximum(points[:, 2:], 0.1), *_border(scene.camera))
+        rays = np.clip(
+            points[:, :2] / np.maximum(points[:, 2:], 0.1), *border_rays(scene.camera))
         return self._shown(scene, (rays.min(axis=0) + rays.max(axis=0)) / 2, surface_m)
 
     def _look_at_nobody(self, scene: TrainingScene) -> TrainingScene:
@@ -89,13 +95,11 @@ class CloseScenes:
         self, scene: TrainingScene, middle: Float[np.ndarray, '2'], surface_m: float
     ) -> TrainingScene:
         """Return the view around a ray, at a depth, both guessed with an error."""
-        rng, (width, height) = self._rng, self.size
+        rng = self._rng
         surface_m = max(surface_m + rng.normal(0.0, SURFACE_M), 0.3)
         middle = middle + rng.normal(0.0, GUESSED_M, 2) / surface_m
         enlarged = surface_m / self.shown_at_m
-        centre = np.array([width - 1, height - 1]) / 2 - middle * self.focal_px * enlarged
-        camera = Camera(
-            width, height, self.focal_px, self.focal_px, float(centre[0]), float(centre[1]))
+        camera = centred_camera(middle, *self.size, self.focal_px, enlarged)
         return seen_from_near(scene, NetworkView(
             camera, enlarged, surface_m - self.shown_at_m, self.shown_at_m - BEFORE_M))
 
@@ -107,10 +111,8 @@ def seen_from_near(scene: TrainingScene, view: NetworkView) -> TrainingScene:
         scene: Fine image and truth.
         view: What to show.
     """
-    fine, shown = scene.camera, view.camera
-    ratio = fine.fx / (shown.fx * view.enlarged)
-    rows = np.rint((np.arange(shown.height) - shown.cy) * ratio + fine.cy).astype(np.int64)
-    columns = np.rint((np.arange(shown.width) - shown.cx) * ratio + fine.cx).astype(np.int64)
+    fine = scene.camera
+    rows, columns = shown_pixels(fine, view)
     inside = (((rows >= 0) & (rows < fine.height))[:, None]
               & ((columns >= 0) & (columns < fine.width)))
     at = np.ix_(rows.clip(0, fine.height - 1), columns.clip(0, fine.width - 1))
@@ -122,10 +124,4 @@ def seen_from_near(scene: TrainingScene, view: NetworkView) -> TrainingScene:
         np.where(there, scene.owner[at], np.int8(-1)),
         np.where(there, scene.part_labels[at], np.int8(-1)),
         tuple(replace(p, shared_points=view.from_camera(p.shared_points)) for p in scene.people),
-        shown)
-
-
-def _border(camera: Camera) -> Float[np.ndarray, '2 2']:
-    """Return the least and the greatest ray (x/z, y/z) of an image."""
-    last = np.array([camera.width, camera.height]) - 1
-    return np.asarray((np.array([[0, 0], last]) - [camera.cx, camera.cy]) / camera.fx)
+        view.camera)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -87,8 +88,8 @@ class Trainer:
                 group['lr'] = rates[name] * factor
         targets = make_targets(batch)
         self.network.train()
-        # bfloat16 needs no scaling of the loss; on CPUs it is slower than float32 here.
-        with torch.autocast(self.device.type, torch.bfloat16, self.device.type == 'cuda'):
+        # bfloat16 needs no scaling of the loss.
+        with torch.autocast(self.device.type, torch.bfloat16, _has_bfloat16(self.device)):
             maps = self.network(batch.depth_m[:, None].contiguous(
                 memory_format=torch.channels_last))
         terms = losses(maps, targets)
@@ -149,7 +150,7 @@ class Trainer:
                 that was trained for another look.
         """
         state = read_checkpoint(path)
-        is_same = NetworkConfig(**state['network_config']) == self.network.config
+        is_same = config_of(state, path) == self.network.config
         if 'network' in state and not is_same:
             raise CheckpointError(
                 f'{path}: expected a training of {self.network.config} to go on with, '
@@ -168,6 +169,11 @@ class Trainer:
             self.history = list(state['history'])
 
 
+def _has_bfloat16(device: torch.device) -> bool:
+    """Return whether bfloat16 is faster than float32: not where a processor only imitates it."""
+    return device.type == 'cuda' or bool(torch.cpu.get_capabilities().get('avx512_bf16', False))
+
+
 def load_network(path: Path) -> DepthNet:
     """Return the averaged network of a checkpoint, ready to be used on the CPU.
 
@@ -175,9 +181,29 @@ def load_network(path: Path) -> DepthNet:
         CheckpointError: If it is no checkpoint.
     """
     state = read_checkpoint(path)
-    network = DepthNet(NetworkConfig(**state['network_config']))
+    network = DepthNet(config_of(state, path))
     network.load_state_dict(state['averaged'])
     return network.eval()
+
+
+def config_of(state: Mapping[str, Any], path: Path) -> NetworkConfig:
+    """Return the size of the network whose weights a checkpoint holds.
+
+    Raises:
+        CheckpointError: If the weights are not those of a network of the size it states.
+    """
+    found, weights = state['network_config'], state['averaged']
+    try:
+        config = NetworkConfig(**found)
+        if sum(config.blocks) > len(weights):
+            raise ValueError('more blocks than weights')
+        with torch.device('meta'):  # whatever size is stated, nothing is allocated
+            DepthNet(config).load_state_dict(weights, assign=True)
+    except (TypeError, ValueError, RuntimeError, AttributeError) as error:
+        raise CheckpointError(
+            f'{path}: expected weights of a depth network, found others than those of {found}'
+        ) from error
+    return config
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:

@@ -26,6 +26,8 @@ from pop_ros.parameters import ConfigParameters
 from pop_ros.static_frames import StaticFrames
 from pop_ros.statistics import NodeStatistics
 
+READY_S = 300.0  # a first start draws the pose library and compiles kernels
+
 
 def prepared(
     node: LifecycleNode, keypoints: Path
@@ -50,7 +52,9 @@ def messages(recording: Recording, number: int) -> RgbdMessages:
 @pytest.fixture
 def node() -> Iterator[LifecycleNode]:
     rclpy.init()
-    made = LifecycleNode('pop')
+    # Not called pop: the services of a life cycle outlive destroy_node until they are collected, and
+    # another test would ask them in place of its own node.
+    made = LifecycleNode('pop_at_work')
     yield made
     made.destroy_node()
     rclpy.try_shutdown()
@@ -66,7 +70,7 @@ def test_frames_after_a_fault_are_fitted_and_the_fault_is_counted(
     color.header.stamp = depth.header.stamp = info.header.stamp = Time()
     sees = looks.look_for_people
     with Listener() as clock:
-        assert clock.spin_until(lambda: work.is_ready, 120)
+        assert clock.spin_until(lambda: work.is_ready, READY_S)
         work.run(True)
         for count in range(1, 7):
             monkeypatch.setattr(looks, 'look_for_people', divide_by_zero if count % 2 else sees)
@@ -96,7 +100,7 @@ def test_frames_that_nobody_had_time_for_do_not_make_a_camera_slow(
             *args, skipped=skipped, **named))
     work, statistics = prepared(node, recording.keypoints)
     with Listener() as clock:
-        assert clock.spin_until(lambda: work.is_ready, 120)
+        assert clock.spin_until(lambda: work.is_ready, READY_S)
         work.run(True)
         for number in (1, 2, 3, 6):
             work.put(messages(recording, number))
@@ -113,7 +117,7 @@ def test_people_are_followed_while_the_keypoint_source_thinks(
     recording = record(tmp_path, n_frames=12, rate_hz=15.0)
     work, statistics = prepared(node, recording.keypoints)
     with Listener() as clock:
-        assert clock.spin_until(lambda: work.is_ready, 120)
+        assert clock.spin_until(lambda: work.is_ready, READY_S)
         work.run(True)
         for number in range(1, 13):
             if number == 3:
@@ -133,7 +137,7 @@ def test_a_frame_that_waits_for_a_stuck_source_is_given_up_at_the_end(
     monkeypatch.setattr(looks, 'look_for_people', take_for_ever)
     work, statistics = prepared(node, recording.keypoints)
     with Listener() as clock:
-        assert clock.spin_until(lambda: work.is_ready, 120)
+        assert clock.spin_until(lambda: work.is_ready, READY_S)
         work.run(True)
         work.put(messages(recording, 1))
         assert clock.spin_until(lambda: work.looking_s > 0.0, 20)

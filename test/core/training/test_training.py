@@ -235,6 +235,19 @@ def test_weights_of_another_size_are_told(tmp_path):
         other.load(tmp_path / 'w.pt')
 
 
+@pytest.mark.parametrize('config', [
+    {'layers': 3}, {'widths': 'many'}, {'widths': [10**9] * 5, 'blocks': [1] * 4},
+    {'widths': [4] * 5, 'blocks': [10**9] * 4}, [1, 2]])
+def test_a_checkpoint_that_states_no_size_of_its_weights_is_told(tmp_path, config):
+    trainer().save_weights(tmp_path / 'w.pt')
+    state = torch.load(tmp_path / 'w.pt', weights_only=True)
+    torch.save(state | {'network_config': config}, tmp_path / 'w.pt')
+    with pytest.raises(CheckpointError, match='expected weights of a depth network'):
+        load_network(tmp_path / 'w.pt')
+    with pytest.raises(CheckpointError, match='expected weights of a depth network'):
+        trainer().load(tmp_path / 'w.pt')
+
+
 def test_scenes_smaller_than_the_networks_input_are_told(small_scenes, tmp_path):
     save_shard(pack(small_scenes[:2]), tmp_path / 'scenes' / 'a.npz')
     run = RunConfig(tmp_path / 'run', 0.01, size=(192, 160), scenes=tmp_path / 'scenes')
