@@ -16,7 +16,13 @@ from pop_core.training.network import NetworkConfig
 from pop_core.training.run import RunConfig, train
 from pop_core.training.run import validate as validated
 from pop_core.training.scene_writer import SHARD_SCENES, SceneKind, write_shards
-from pop_core.training.trainer import TrainConfig, Trainer, config_of, load_network, read_checkpoint
+from pop_core.training.trainer import (
+    TrainConfig,
+    Trainer,
+    config_of,
+    load_network,
+    read_checkpoint,
+)
 
 BAD_INPUT = 2
 SIZES = {

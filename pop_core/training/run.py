@@ -15,8 +15,8 @@ from pop_core.training.augmentation import cropped, varied
 from pop_core.training.curves import save_curves
 from pop_core.training.scene_pool import ScenePool
 from pop_core.training.scene_stream import SceneStream
-from pop_core.training.scene_writer import MARGIN_PX, SHARD_SCENES, SceneKind
-from pop_core.training.shards import Shard, ShardError, load_shard, shard_paths
+from pop_core.training.scene_writer import SHARD_SCENES, SceneKind
+from pop_core.training.shards import load_fitting, shard_paths
 from pop_core.training.targets import Batch, make_targets
 from pop_core.training.trainer import Trainer
 from pop_core.training.validation import MapScores
@@ -77,7 +77,7 @@ def validate(trainer: Trainer, config: RunConfig) -> dict[str, float]:
         return {}
     scores = MapScores()
     for path in shard_paths(config.validation):
-        shard = _fitting(path, config.size)
+        shard = load_fitting(path, config.size)
         pool = ScenePool(len(shard), torch.device('cpu'))
         pool.add(shard)
         for start in range(0, pool.count, VALIDATION_BATCH):
@@ -162,29 +162,13 @@ def _filled(
         capacity = min(capacity, SHARD_SCENES * len(paths))
     pool = ScenePool(capacity, device)
     for path in paths[-(capacity // SHARD_SCENES):]:
-        pool.add(_fitting(path, config.size))
+        pool.add(load_fitting(path, config.size))
     while config.scenes is None and pool.count < FIRST_SCENES:
         piece = stream.take(timeout_s=5.0)
         if piece is not None:
             pool.add(piece)
     say(f'{pool.count} scenes to begin with')
     return pool
-
-
-def _fitting(path: Path, size: tuple[int, int]) -> Shard:
-    """Return the scenes of a file.
-
-    Raises:
-        ShardError: If they were not drawn for a network of this size.
-    """
-    shard = load_shard(path)
-    height, width = shard.depth_mm.shape[1:]
-    wanted = size[0] + MARGIN_PX, size[1] + MARGIN_PX
-    if (width, height) != wanted:
-        raise ShardError(
-            f'{path}: expected scenes of {wanted[0]}x{wanted[1]}, found {width}x{height}: '
-            'draw them with the same --size')
-    return shard
 
 
 def _middle(batch: Batch, size: tuple[int, int]) -> Batch:

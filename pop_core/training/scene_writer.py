@@ -14,10 +14,9 @@ from pop_core.body.default_body import default_body
 from pop_core.synthesis.coarse_body import coarse_body
 from pop_core.synthesis.training_scenes import TrainingScenes
 from pop_core.training.close_scenes import FINE_FOCAL_PX, FINE_SIZE, CloseScenes
-from pop_core.training.shards import ShardError, pack, save_shard
+from pop_core.training.shards import MARGIN_PX, ShardError, load_fitting, pack, save_shard
 
 SHARD_SCENES = 256
-MARGIN_PX = 16  # scenes are larger than the network's input by this: crops shift them
 
 
 def load_motions(path: Path) -> list[Float[np.ndarray, '23 3']]:
@@ -80,10 +79,15 @@ def write_shards(
         seed: Decides every scene, whatever the number of workers.
         kind: Which scenes.
         workers: Processes.
+
+    Raises:
+        ShardError: If what is there already was drawn for a network of another size.
     """
     jobs = [(folder / f'{seed:04d}_{k:05d}.npz', seed * 100_000 + k, kind)
             for k in range(-(-count // SHARD_SCENES))]
     todo = [job for job in jobs if not job[0].exists()]
+    if len(todo) < len(jobs):
+        load_fitting(next(path for path, *_ in jobs if path.exists()), kind.size)
     done = (len(jobs) - len(todo)) * SHARD_SCENES
     if workers == 1:
         for job in todo:

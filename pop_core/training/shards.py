@@ -14,6 +14,7 @@ from pop_core.keypoints.body_parts import CLASS_OF_LABEL
 from pop_core.synthesis.training_scenes import TrainingScene
 
 MAX_PEOPLE = 6
+MARGIN_PX = 16  # scenes are larger than the network's input by this: crops shift them
 OWNER_SHIFT = 4  # labels hold the class in their low bits and 1 + owner above
 
 
@@ -81,6 +82,26 @@ def load_shard(path: Path) -> Shard:
             return Shard(**{field.name: arrays[field.name] for field in fields(Shard)})
     except (OSError, ValueError, KeyError, EOFError) as error:
         raise ShardError(f'{path}: expected packed training scenes, found: {error}') from None
+
+
+def load_fitting(path: Path, size: tuple[int, int]) -> Shard:
+    """Return the scenes of a file that a network of some size is to learn from.
+
+    Args:
+        path: The file.
+        size: Width and height of the network's input [px].
+
+    Raises:
+        ShardError: If the file is no shard, or was drawn for another size.
+    """
+    shard = load_shard(path)
+    height, width = shard.depth_mm.shape[1:]
+    wanted = size[0] + MARGIN_PX, size[1] + MARGIN_PX
+    if (width, height) != wanted:
+        raise ShardError(
+            f'{path}: expected scenes of {wanted[0]}x{wanted[1]}, found {width}x{height}: '
+            'another --size drew them')
+    return shard
 
 
 def shard_paths(folder: Path) -> list[Path]:

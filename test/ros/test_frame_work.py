@@ -52,7 +52,7 @@ def messages(recording: Recording, number: int) -> RgbdMessages:
 @pytest.fixture
 def node() -> Iterator[LifecycleNode]:
     rclpy.init()
-    # Not called pop: the services of a life cycle outlive destroy_node until they are collected, and
+    # Not called pop: services of a life cycle outlive destroy_node until they are collected, and
     # another test would ask them in place of its own node.
     made = LifecycleNode('pop_at_work')
     yield made

@@ -11,7 +11,8 @@ from pop_core.keypoints.canonical_depth import canonical_view
 from pop_core.keypoints.close_view import BEFORE_M, NetworkView, close_depth, close_view
 from pop_core.synthesis.training_scenes import TrainingScene
 from pop_core.training.close_scenes import FEWEST_SHOWN, seen_from_near
-from pop_core.training.scene_writer import MARGIN_PX, SceneKind, scene_stream
+from pop_core.training.scene_writer import SceneKind, scene_stream
+from pop_core.training.shards import MARGIN_PX
 
 KIND = SceneKind((128, 160), 160.0, shown_at_m=2.0)
 

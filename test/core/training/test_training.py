@@ -23,7 +23,7 @@ from pop_core.training.network import (  # noqa: E402
 from pop_core.training.run import RunConfig, train, validate  # noqa: E402
 from pop_core.training.scene_pool import ScenePool  # noqa: E402
 from pop_core.training.scene_stream import SceneStream  # noqa: E402
-from pop_core.training.scene_writer import SceneKind  # noqa: E402
+from pop_core.training.scene_writer import SceneKind, write_shards  # noqa: E402
 from pop_core.training.targets import make_targets  # noqa: E402
 from pop_core.training.trainer import (  # noqa: E402
     CheckpointError,
@@ -246,6 +246,12 @@ def test_a_checkpoint_that_states_no_size_of_its_weights_is_told(tmp_path, confi
         load_network(tmp_path / 'w.pt')
     with pytest.raises(CheckpointError, match='expected weights of a depth network'):
         trainer().load(tmp_path / 'w.pt')
+
+
+def test_scenes_of_another_size_in_the_way_are_told(small_scenes, tmp_path):
+    save_shard(pack(small_scenes[:2]), tmp_path / '0001_00000.npz')
+    with pytest.raises(ShardError, match='scenes of 208x176, found 112x80'):
+        list(write_shards(tmp_path, 512, seed=1, kind=SceneKind((192, 160), 160.0)))
 
 
 def test_scenes_smaller_than_the_networks_input_are_told(small_scenes, tmp_path):
