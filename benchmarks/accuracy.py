@@ -120,9 +120,11 @@ def make_methods(
     model = default_body()
     source: KeypointDetector = detector
     if options.keypoints != 'truth':
+        from pop_ros import keypoint_sources
         from pop_ros.sources import make_detector
 
         source = make_detector(options.keypoints)
+        keypoint_sources.apply_settings(source, config)
     pipeline = BodyPipeline(model, library, source, config)
     methods: dict[str, Method] = {MAIN: Pipeline(pipeline)}
     if not options.no_baselines:

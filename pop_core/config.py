@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from pop_core.fitting.fitting_config import FittingConfig
+from pop_core.keypoints.depth_votes import DepthNetConfig
 from pop_core.keypoints.fusion import FusionConfig
 from pop_core.keypoints.lifting import LiftingConfig
 from pop_core.keypoints.people_selection import PeopleConfig
@@ -37,6 +38,7 @@ class PipelineConfig:
     region: RegionConfig = field(default_factory=RegionConfig)
     people: PeopleConfig = field(default_factory=PeopleConfig)
     fusion: FusionConfig = field(default_factory=FusionConfig)
+    depth_net: DepthNetConfig = field(default_factory=DepthNetConfig)
     lifting: LiftingConfig = field(default_factory=LiftingConfig)
     retrieval: RetrievalConfig = field(default_factory=RetrievalConfig)
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, UInt8
 
 from pop_core.errors import FrameError
 from pop_core.geometry.camera import Camera
 from pop_core.geometry.flying_pixel_kernels import flying
+from pop_core.geometry.lens_maps import lens_maps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +39,12 @@ class RgbdFrame:
                 f'frame: expected colour and depth of {size[1]}x{size[0]} as the camera says, '
                 f'found colour {self.rgb.shape} and depth {self.depth_m.shape}'
             )
+        no_distance = (self.depth_m <= 0) | np.isinf(self.depth_m)
+        if no_distance.any():
+            raise FrameError(
+                'frame: expected depth in metres and NaN where nothing was measured, found '
+                f'{np.count_nonzero(no_distance)} pixels of 0, below, or infinite: '
+                'pop_core.rgbd.clean_depth makes them NaN')
 
 
 def clean_depth(depth_m: Float32[np.ndarray, 'h w']) -> Float32[np.ndarray, 'h w']:
@@ -56,18 +62,19 @@ def undistort_frame(frame: RgbdFrame) -> RgbdFrame:
     camera = frame.camera
     if not camera.is_distorted:
         return frame
-    size = (camera.width, camera.height)
-    if camera.distortion_model == 'equidistant':
-        maps = cv2.fisheye.initUndistortRectifyMap(
-            camera.K, camera.d, np.eye(3), camera.K, size, cv2.CV_32FC1)
-    else:
-        maps = cv2.initUndistortRectifyMap(
-            camera.K, camera.d, np.eye(3), camera.K, size, cv2.CV_32FC1)
-    rgb = cv2.remap(frame.rgb, *maps, cv2.INTER_LINEAR)
-    depth_m = cv2.remap(
-        frame.depth_m, *maps, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT,
-        borderValue=float('nan'))
-    return RgbdFrame(rgb, depth_m, camera.without_distortion(), frame.stamp_ns)
+    seen = lens_maps(camera).of_pinhole
+    return RgbdFrame(
+        seen.interpolated(frame.rgb), seen.nearest(frame.depth_m, float('nan')),
+        camera.without_distortion(), frame.stamp_ns)
+
+
+def undistort_mask(
+    mask: Bool[np.ndarray, 'h w'], camera: Camera
+) -> Bool[np.ndarray, 'h w']:
+    """Return a mask of the camera's image in the pixels of its pinhole."""
+    if not camera.is_distorted:
+        return mask
+    return lens_maps(camera).of_pinhole.nearest(mask.view(np.uint8), 0.0).view(bool)
 
 
 def distort_mask(
@@ -76,11 +83,7 @@ def distort_mask(
     """Return a mask of the pinhole image in the pixels of the camera's own image."""
     if not camera.is_distorted:
         return mask
-    rays = camera.ray_grid()
-    u = np.rint(rays[..., 0] * camera.fx + camera.cx).astype(np.int64)
-    v = np.rint(rays[..., 1] * camera.fy + camera.cy).astype(np.int64)
-    inside = (u >= 0) & (v >= 0) & (u < camera.width) & (v < camera.height)
-    return inside & mask[np.where(inside, v, 0), np.where(inside, u, 0)]
+    return lens_maps(camera).of_camera.nearest(mask.view(np.uint8), 0.0).view(bool)
 
 
 def point_cloud(

@@ -83,10 +83,14 @@ def keep_people(detector: object, config: PeopleConfig) -> None:
 
 
 def apply_settings(detector: object, config: PipelineConfig) -> None:
-    """Tell a source the settings of people.* and fusion.*."""
+    """Tell a source the settings of people.*, fusion.* and depth_net.*."""
+    from pop_core.keypoints.depth_net import DepthNetDetector
     from pop_core.keypoints.fusion import FusedDetector
 
     keep_people(detector, config.people)
+    for part in _parts(detector):
+        if isinstance(part, DepthNetDetector):
+            part.config = config.depth_net
     if isinstance(detector, FusedDetector):
         detector.config = config.fusion
 

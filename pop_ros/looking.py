@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numpy as np
-
-from pop_core.body.joints import N_SHARED
+from pop_core.body.default_body import default_body
 from pop_core.config import PipelineConfig
-from pop_core.geometry.camera import Camera
+from pop_core.errors import PopError
 from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.rgbd import RgbdFrame
 from pop_core.tracking.background import Background
 from pop_core.tracking.looks import look_for_people
 from pop_ros.keypoint_sources import apply_settings
 from pop_ros.node_arguments import SourceArguments
+from pop_ros.warm_up import OnePerson, small_scene
 
 LOOKING_NICENESS = 5  # whoever comes out from behind something is waited for
-WARM_CAMERA = Camera(160, 120, 130.0, 130.0, 79.5, 59.5)
-WARM_WALL_M = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +71,7 @@ def _detect(eyes: Eyes, frame: RgbdFrame) -> list[Detection]:
 @lru_cache(maxsize=1)
 def _detector(sources: SourceArguments) -> KeypointDetector:
     detector = sources.detector()
-    _warm_up()
+    _warm_up(detector)
     return detector
 
 
@@ -84,20 +82,9 @@ def _eyes(sources: SourceArguments, config: PipelineConfig) -> Eyes:
     return Eyes(detector, config)
 
 
-class _Somebody:
-    """Keypoints all over the image."""
-
-    def detect(self, frame: RgbdFrame) -> list[Detection]:
-        """Return one person."""
-        size = np.array([frame.camera.width, frame.camera.height], dtype=np.float64)
-        across = np.linspace(0.2, 0.8, N_SHARED)[:, None] * size
-        return [Detection(across, np.ones(N_SHARED), np.concatenate([0.2 * size, 0.8 * size]))]
-
-
-def _warm_up() -> None:
-    """Look once, so that no real frame pays for loading kernels."""
-    shape = WARM_CAMERA.height, WARM_CAMERA.width
-    frame = RgbdFrame(
-        np.zeros((*shape, 3), dtype=np.uint8), np.full(shape, WARM_WALL_M, dtype=np.float32),
-        WARM_CAMERA)
-    look_for_people(Eyes(_Somebody(), PipelineConfig()), frame, frame)
+def _warm_up(detector: KeypointDetector) -> None:
+    """Look once with the source and once for somebody, so that no real frame pays for loading."""
+    frame, somebody = small_scene(default_body())
+    with suppress(PopError):  # files hold no keypoints of this frame
+        detector.detect(frame)
+    look_for_people(Eyes(OnePerson(somebody), PipelineConfig()), frame, frame)

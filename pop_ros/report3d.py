@@ -17,9 +17,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pop_core.body.joints import PARENTS
-from pop_core.rendering.pictures import undistorted_mask
 from pop_core.rendering.shown_body import ShownBody, body_color
-from pop_core.rgbd import RgbdFrame, point_cloud, undistort_frame
+from pop_core.rgbd import RgbdFrame, point_cloud, undistort_frame, undistort_mask
 
 MAX_POINTS = 36_000  # of room and of people: 0.4 MB of a page each, at most
 NEAR_M = 2.2  # the room farther from people than that says nothing about them
@@ -84,7 +83,7 @@ def scene_data(scenes: Sequence[SceneFrame], f: Int[np.ndarray, 'm 3']) -> dict[
 
 def _frame_data(scene: SceneFrame) -> dict[str, Any]:
     seen = undistort_frame(scene.frame)
-    masks = [undistorted_mask(body.mask, scene.frame.camera) for body in scene.bodies]
+    masks = [undistort_mask(body.mask, scene.frame.camera) for body in scene.bodies]
     people = np.any([np.zeros(seen.depth_m.shape, dtype=bool), *masks], axis=0)
     return {
         'caption': scene.caption,

@@ -13,9 +13,8 @@ from pop_core.errors import PopError
 from pop_core.estimate import JointState
 from pop_core.rendering.depth_renderer import vertex_normals
 from pop_core.rendering.palette import INK, PAPER
-from pop_core.rendering.pictures import undistorted_mask
 from pop_core.rendering.shown_body import ShownBody, body_color
-from pop_core.rgbd import RgbdFrame, point_cloud, undistort_frame
+from pop_core.rgbd import RgbdFrame, point_cloud, undistort_frame, undistort_mask
 from pop_ros.report3d import SceneFrame
 
 APPLICATION = 'pop'
@@ -55,7 +54,7 @@ def write_rerun(scenes: Iterable[SceneFrame], f: np.ndarray, path: Path) -> int:
         for index, body in enumerate(scene.bodies):
             name = f'people/{index if body.id is None else body.id}'
             _log_body(rr, recording, name, body, f, body_color(body, index))
-            mask = undistorted_mask(body.mask, scene.frame.camera)
+            mask = undistort_mask(body.mask, scene.frame.camera)
             _log_points(rr, recording, f'{name}/points', seen, mask)
         count += 1
     recording.flush()

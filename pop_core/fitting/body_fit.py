@@ -111,10 +111,10 @@ class BodyFitter:
                 break
             hypotheses, segment = kept, self._compare(kept, observation, unclaimed)
         winner, *others = _best(hypotheses, len(hypotheses))
+        excess = [other.cost - winner.cost for other in others]
         named = observation
         if self.config.other_readings:
             winner, named = best_facing(winner, observation, self.steps, TURNED_SCHEDULE)
-        excess = [other.cost - winner.cost for other in others]
         body = self._polished(winner, named)
         left = disagreement(
             body.state, [other.state for other in others], excess,

@@ -60,7 +60,7 @@ def disagreement(
         winner: The body.
         rivals: Runners-up.
         excess: What each of them costs beyond the winner.
-        started: Every hypothesis that was ever fitted, where it ended.
+        started: Every retrieved hypothesis, where its own pose ended.
         unnamed: Joints of limbs that no keypoint confirms.
     """
     return Disagreement(

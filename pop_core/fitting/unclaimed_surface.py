@@ -42,7 +42,8 @@ class UnclaimedSurface:
         """Find what hangs together with the lifted bones of an observation."""
         self.observation = observation
         self._bones = _BonePixels.of(observation)
-        self._pixel_m2 = (np.nan_to_num(observation.depth_m) / observation.camera.fx) ** 2
+        depth_m, camera = np.nan_to_num(observation.depth_m), observation.camera
+        self._pixel_m2 = (depth_m / camera.fx) * (depth_m / camera.fy)
         self._person: Bool[np.ndarray, 'h w'] | None = None
         self._with_flats = self._reached(observation.own)
         self.found: Bool[np.ndarray, 'h w'] | None = None
@@ -88,7 +89,7 @@ class UnclaimedSurface:
         out = np.zeros(observation.own.shape, dtype=bool)
         for plane in find_planes(observation.depth_m, camera, observation.noise):
             number, area_m2 = pieces_of_plane(
-                plane, observation.depth_m, observation.rays, camera.fx, observation.noise)
+                plane, observation.depth_m, observation.rays, camera, observation.noise)
             named_m2 = np.bincount(
                 number[bones.v, bones.u], weights=bones.area_m2, minlength=len(area_m2))
             flat = (area_m2 > LEAST_M2) & (named_m2 < NAMED_SHARE * area_m2)

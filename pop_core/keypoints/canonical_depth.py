@@ -26,26 +26,25 @@ class CanonicalView:
         camera: Pinhole with sides divisible by 32.
         source_v: Row of the measured image per canonical pixel, -1 outside.
         source_u: Column of it.
-        rays: (x/z, y/z) of each measured pixel.
     """
 
     camera: Camera
     source_v: Int[np.ndarray, 'H W']
     source_u: Int[np.ndarray, 'H W']
-    rays: Float32[np.ndarray, 'h w 2']
 
 
 def canonical_view(
-    camera: Camera, focal_px: float, largest_px: float = LARGEST_SIDE
+    camera: Camera, rays: Float[np.ndarray, 'h w 2'], focal_px: float,
+    largest_px: float = LARGEST_SIDE,
 ) -> CanonicalView:
     """Return the view that covers a camera's image.
 
     Args:
         camera: The measuring camera; lens distortion is undone.
+        rays: (x/z, y/z) of each of its pixels.
         focal_px: Focal length of the view [px].
         largest_px: Wider views than this are cut at the sides [px].
     """
-    rays = camera.ray_grid()
     low, high = (_extreme(rays, focal_px, side, largest_px / 2) for side in (0, 1))
     width, height = (_side(b - a) for a, b in zip(low, high, strict=True))
     # What padding there is lies evenly on both sides.
@@ -58,8 +57,7 @@ def canonical_view(
     inside = ((nearest >= 0) & (nearest < [camera.width, camera.height])).all(axis=1)
     nearest[~inside] = -1
     return CanonicalView(
-        view, nearest[:, 1].reshape(height, width), nearest[:, 0].reshape(height, width),
-        rays.astype(np.float32))
+        view, nearest[:, 1].reshape(height, width), nearest[:, 0].reshape(height, width))
 
 
 def canonical_depth(

@@ -83,7 +83,7 @@ def border_rays(camera: Camera) -> Float[np.ndarray, '2 2']:
 
 def close_view(
     focal_px: float, enlarged: float, joints: Float[np.ndarray, 's 3'], surface_m: float,
-    fine: CanonicalView,
+    fine: CanonicalView, before_m: float = BEFORE_M,
 ) -> NetworkView:
     """Return the view that shows a person near and in the middle, no larger than needed.
 
@@ -93,6 +93,7 @@ def close_view(
         joints: Where the person's joints may be, camera frame [m].
         surface_m: Depth of the person's surface [m].
         fine: A view of the camera: beyond its borders there is nothing to show.
+        before_m: What stands this far before the person is left out.
     """
     rays = joints[:, :2] / joints[:, 2:]
     margin = MARGIN_M / surface_m
@@ -104,8 +105,8 @@ def close_view(
         for extent in (high - low) * focal_px * enlarged)
     camera = centred_camera((low + high) / 2, width, height, focal_px, enlarged)
     shown_at_m = surface_m / enlarged
-    nearest_m = shown_at_m - BEFORE_M if enlarged != 1.0 else 0.0
-    return NetworkView(camera, enlarged, surface_m - shown_at_m, nearest_m)
+    return NetworkView(
+        camera, enlarged, surface_m - shown_at_m, max(shown_at_m - before_m, 0.0))
 
 
 def close_depth(

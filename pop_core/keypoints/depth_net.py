@@ -13,7 +13,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Float32
 
 from pop_core.errors import NetworkShapeError
 from pop_core.geometry.camera import Camera
@@ -43,11 +43,19 @@ BOX_SCORE = 0.3  # of joints whose pixels a person's box holds: thin limbs may l
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Views:
-    """What is computed once per camera: the view of the whole image, and a fine one."""
+    """What is computed once per camera.
+
+    Args:
+        camera: The camera.
+        whole: View of the whole image.
+        fine: A finer one, to read near looks from.
+        rays: (x/z, y/z) of each measured pixel.
+    """
 
     camera: Camera
     whole: CanonicalView
     fine: CanonicalView
+    rays: Float32[np.ndarray, 'h w 2']
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,9 +103,7 @@ class DepthNetDetector:
         """Return what the networks are."""
         each = dict.fromkeys((self._network, self._close))
         return 'people from depth alone: ' + ', '.join(
-            f'{network.session.where} '
-            f'({network.session.facts.get("about", "nothing said about its training")})'
-            for network in each)
+            f'{network.session.where} ({network.about})' for network in each)
 
     def detect(self, frame: RgbdFrame) -> list[Detection]:
         """Return the people of a frame, best first."""
@@ -105,7 +111,7 @@ class DepthNetDetector:
         closer = [self.closer(frame, first, k) for k in range(len(first))]
         people = distinct([look for look in closer if look is not None], self.config)
         labels = no_labels(frame.depth_m.shape)
-        rays = self.views(frame.camera).whole.rays
+        rays = self.views(frame.camera).rays
         for index, look in enumerate(people):
             label_pixels(labels, index, look.cells, look.view, frame, rays)
         found = [_detection(look.person, k, labels, frame) for k, look in enumerate(people)]
@@ -139,7 +145,7 @@ class DepthNetDetector:
         network = self._close
         view = close_view(
             network.focal_px, network.enlarged(person.surface_m), person.joints, person.surface_m,
-            fine)
+            fine, network.before_m(person.surface_m))
         cells = network.cells(
             close_depth(frame.depth_m, fine, view), view, self.config.min_person_probability)
         trunks = np.array([look.trunk for look in looks])
@@ -156,16 +162,15 @@ class DepthNetDetector:
     def views(self, camera: Camera) -> Views:
         """Return the views of a camera; kept while the camera stays the same."""
         if self._views is None or not self._views.camera.sees_like(camera):
-            fine_px = FINEST * self._close.focal_px
+            fine_px, rays = FINEST * self._close.focal_px, camera.ray_grid()
             self._views = Views(
-                camera, canonical_view(camera, self._network.focal_px),
-                canonical_view(camera, fine_px, FINEST * LARGEST_SIDE))
+                camera, canonical_view(camera, rays, self._network.focal_px),
+                canonical_view(camera, rays, fine_px, FINEST * LARGEST_SIDE),
+                rays.astype(np.float32))
         return self._views
 
 
-def load_depth_net(
-    path: Path = EMBEDDED, config: DepthNetConfig | None = None
-) -> DepthNetDetector:
+def load_depth_net(path: Path = EMBEDDED) -> DepthNetDetector:
     """Return the detector of a file, the embedded one by default.
 
     A network of near looks is taken where it lies beside: NET_close.onnx for NET.onnx.
@@ -173,12 +178,10 @@ def load_depth_net(
     Raises:
         NetworkShapeError: If there is no such file or it is no network of this kind.
     """
-    return depth_net_of(load_network(path), path, config)
+    return depth_net_of(load_network(path), path)
 
 
-def depth_net_of(
-    session: OnnxSession, path: Path, config: DepthNetConfig | None = None
-) -> DepthNetDetector:
+def depth_net_of(session: OnnxSession, path: Path) -> DepthNetDetector:
     """Return the detector of a loaded file, with the network of near looks that lies beside it.
 
     Raises:
@@ -186,7 +189,7 @@ def depth_net_of(
     """
     beside = close_path(path)
     close = DepthNetwork(load_network(beside)) if beside.is_file() else None
-    return DepthNetDetector(DepthNetwork(session), config, close)
+    return DepthNetDetector(DepthNetwork(session), close=close)
 
 
 def _other_look(network: DepthNetwork, wanted: str) -> NetworkShapeError:

@@ -10,10 +10,11 @@ from jaxtyping import Float32
 
 from pop_core.errors import NetworkShapeError
 from pop_core.keypoints.body_parts import N_CLASSES
-from pop_core.keypoints.close_view import SHOWN_AT_M, NetworkView
+from pop_core.keypoints.canonical_depth import SIDE_MULTIPLE, STRIDE
+from pop_core.keypoints.close_view import BEFORE_M, SHOWN_AT_M, NetworkView
 from pop_core.keypoints.depth_votes import Cells, read_cells
 from pop_core.keypoints.network import Tensor
-from pop_core.keypoints.onnx_session import OnnxSession
+from pop_core.keypoints.onnx_session import OnnxSession, one_line
 
 EMBEDDED = Path(__file__).parents[1] / 'data' / 'depth_net.onnx'
 KIND, FORMAT = 'pop_depth_net', '1'
@@ -38,9 +39,11 @@ class DepthNetwork:
         """
         _check_kind(session)
         self.session = session
+        self.about = one_line(session.facts.get('about', 'nothing said about its training'))
         self.focal_px = _fact(session, 'focal_px', FOCAL_PX)
         self.is_close = 'shown_at_m' in session.facts
         self._shown_at_m = _fact(session, 'shown_at_m', SHOWN_M) if self.is_close else SHOWN_AT_M
+        _check_grid(session, self.run(np.zeros((SIDE_MULTIPLE, SIDE_MULTIPLE), np.float32)))
 
     def enlarged(self, surface_m: float) -> float:
         """Return how many times as large as it is a surface at a depth [m] should be shown.
@@ -49,6 +52,13 @@ class DepthNetwork:
         """
         scale = surface_m / self._shown_at_m
         return scale if self.is_close else max(scale, 1.0)
+
+    def before_m(self, surface_m: float) -> float:
+        """Return how far before a surface at a depth [m] a network is shown what stands there.
+
+        Whoever it is shown as they are stands in a scene as it has learned from whole.
+        """
+        return BEFORE_M if self.is_close or self.enlarged(surface_m) > 1.0 else np.inf
 
     def cells(
         self, shown_m: Float32[np.ndarray, 'h w'], view: NetworkView, min_probability: float
@@ -85,6 +95,15 @@ def _check_kind(session: OnnxSession) -> None:
         raise NetworkShapeError(
             f'{session.where}: expected {EXPECTED}, format {FORMAT}; found {session.spec}, '
             f'format {found}')
+
+
+def _check_grid(session: OnnxSession, maps: Sequence[Tensor]) -> None:
+    cells = SIDE_MULTIPLE // STRIDE
+    found = {maps_of.shape[1:] for maps_of in maps}
+    if found != {(cells, cells)}:
+        raise NetworkShapeError(
+            f'{session.where}: expected a cell for every {STRIDE} pixels, that is {cells}x{cells} '
+            f'for an image of {SIDE_MULTIPLE}x{SIDE_MULTIPLE}, found {sorted(found)}')
 
 
 def _fact(session: OnnxSession, name: str, within: tuple[float, float]) -> float:

@@ -22,7 +22,7 @@ from pop_core.settings import setting
 
 TRUNK = np.array([SHARED_INDEX[name] for name in (
     'pelvis', 'left_hip', 'right_hip', 'neck', 'left_shoulder', 'right_shoulder')])
-NEAREST_M = 0.15   # votes before this have no pixel
+NEAREST_M = 0.15  # from the camera: votes before this have no pixel
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,8 @@ def read_cells(
         row, column, depth_m, (depth_m * STRIDE / (view.camera.fx * view.enlarged)) ** 2,
         person[row, column].astype(np.float64),
         probability[:, row, column].T.astype(np.float64),
-        view.to_camera(read_votes(votes, row, column, z, view.camera)),
+        view.to_camera(read_votes(
+            votes, row, column, z, view.camera, NEAREST_M + max(-view.nearer_m, 0.0))),
         np.exp(log_sigma[:, row, column].T.astype(np.float64)),
         1.0 / (1.0 + np.exp(-visible[:, row, column].T.astype(np.float64))))
 
@@ -126,7 +127,7 @@ def cell_depth(depth_m: Float32[np.ndarray, 'h w']) -> Float32[np.ndarray, 'h4 w
 
 def read_votes(
     votes: Float32[np.ndarray, '45 h w'], row: Int[np.ndarray, 'n'], column: Int[np.ndarray, 'n'],
-    depth_m: Float[np.ndarray, 'n'], camera: Camera,
+    depth_m: Float[np.ndarray, 'n'], camera: Camera, nearest_m: float = NEAREST_M,
 ) -> Float[np.ndarray, 'n 15 3']:
     """Return the points [m] that cells vote for.
 
@@ -139,12 +140,13 @@ def read_votes(
         column: Columns of the cells.
         depth_m: Depth of the cells [m].
         camera: Pinhole of the network's input.
+        nearest_m: Depth that no joint is nearer than [m].
     """
     offset = votes[:, row, column].T.reshape(-1, 15, 3).astype(np.float64)
     middle = np.column_stack([column, row]) * float(STRIDE) + (STRIDE - 1) / 2
     scale = (camera.fx / depth_m)[:, None, None]
     uv = middle[:, None] + offset[..., :2] * scale
-    z = np.maximum(depth_m[:, None] + offset[..., 2], NEAREST_M)
+    z = np.maximum(depth_m[:, None] + offset[..., 2], nearest_m)
     xy = (uv - [camera.cx, camera.cy]) / [camera.fx, camera.fy] * z[..., None]
     return np.concatenate([xy, z[..., None]], axis=2)
 

@@ -80,7 +80,7 @@ class OnnxSession:
         except Exception as error:  # noqa: BLE001 - ONNX Runtime's errors share no public base
             raise NetworkShapeError(
                 f'{self.where}: expected outputs within {self.longest_s:.0f} s, found: '
-                f'{_one_line(error)}') from None
+                f'{one_line(error)}') from None
         finally:
             alarm.cancel()
         arrays = [np.asarray(output) for output in outputs]
@@ -136,11 +136,13 @@ def _load(content: bytes, where: str) -> onnxruntime.InferenceSession:
         return onnxruntime.InferenceSession(content, options, providers=providers)
     except Exception as error:  # noqa: BLE001 - ONNX Runtime's errors share no public base
         raise NetworkShapeError(
-            f'{where}: expected an ONNX network, found: {_one_line(error)}') from None
+            f'{where}: expected an ONNX network, found: {one_line(error)}') from None
 
 
-def _one_line(error: Exception) -> str:
-    return ' '.join(str(error).split())[:160]
+def one_line(said: object) -> str:
+    """Return what somebody else says, as a line that fits into a message."""
+    printable = ''.join(c if c.isprintable() else ' ' for c in str(said))
+    return ' '.join(printable.split())[:160]
 
 
 def _check_shape(declared: TensorSpec, array: Tensor, where: str) -> None:

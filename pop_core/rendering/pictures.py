@@ -6,16 +6,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Float, Int, UInt8
 
 from pop_core.estimate import FrameResult
-from pop_core.geometry.camera import Camera
 from pop_core.rendering.overlay import draw_people
 from pop_core.rendering.palette import PAPER
 from pop_core.rendering.scene_view import FROM_ABOVE, FROM_THE_RIGHT, draw_scene, fitting_view
 from pop_core.rendering.shown_body import ShownBody, shown
 from pop_core.rendering.text import captioned, colored_depth
-from pop_core.rgbd import RgbdFrame, point_cloud, undistort_frame
+from pop_core.rgbd import RgbdFrame, point_cloud, undistort_frame, undistort_mask
 
 GAP_PX = 6
 
@@ -53,7 +52,7 @@ def result_panels(
     Lens distortion is taken out of all of them: meshes are drawn as a pinhole sees them.
     """
     seen = undistort_frame(frame)
-    people = [replace(b, mask=undistorted_mask(b.mask, frame.camera)) for b in bodies]
+    people = [replace(b, mask=undistort_mask(b.mask, frame.camera)) for b in bodies]
     overlay = draw_people(seen.rgb, people, f, seen.camera, seen.depth_m)
     count = len(people)
     return [
@@ -95,17 +94,6 @@ def _extent_of_scene(frame: RgbdFrame) -> Float[np.ndarray, '2 3']:
     if not len(cloud):
         return np.array([[-1.0, -1, 1], [1, 1, 3]])
     return np.percentile(cloud, [2.0, 98.0], axis=0)
-
-
-def undistorted_mask(
-    mask: Bool[np.ndarray, 'h w'], camera: Camera
-) -> Bool[np.ndarray, 'h w']:
-    """Return a mask of the camera's image in the pixels of its pinhole."""
-    if not camera.is_distorted:
-        return mask
-    as_depth = mask.astype(np.float32)
-    blank = np.zeros((*mask.shape, 3), dtype=np.uint8)
-    return undistort_frame(RgbdFrame(blank, as_depth, camera)).depth_m > 0.5
 
 
 def _beside(

@@ -39,7 +39,8 @@ def find_planes(
         noise: Noise of its depth.
     """
     points, normals = points_and_normals(depth_m, camera)
-    area_m2 = (points[:, 2] * grid_stride(depth_m.shape) / camera.fx) ** 2
+    side = points[:, 2] * grid_stride(depth_m.shape)
+    area_m2 = (side / camera.fx) * (side / camera.fy)
     width = WIDTH_M + WIDTH_SIGMAS * noise.sigma_m(points[:, 2])
     proposals = np.arange(0, len(points), max(1, len(points) // TRIES))
     offset = -np.einsum('pc,pc->p', normals[proposals], points[proposals])
@@ -76,7 +77,7 @@ def _settled(
 
 def pieces_of_plane(
     plane: Float[np.ndarray, '4'], depth_m: Float32[np.ndarray, 'h w'],
-    rays: Float[np.ndarray, 'h w 2'], focal_px: float, noise: DepthNoise,
+    rays: Float[np.ndarray, 'h w 2'], camera: Camera, noise: DepthNoise,
 ) -> tuple[Int32[np.ndarray, 'h w'], Float[np.ndarray, 'k']]:
     """Return the pixels on a plane, numbered piece by piece from 1, and each piece's area [m^2].
 
@@ -84,7 +85,7 @@ def pieces_of_plane(
         plane: Unit normal and offset [m].
         depth_m: Measured depth [m], NaN where there is none.
         rays: (x/z, y/z) of every pixel.
-        focal_px: Focal length.
+        camera: Pinhole of the image.
         noise: Noise of the depth.
 
     Returns:
@@ -95,7 +96,7 @@ def pieces_of_plane(
     margin_m = MARGIN_M + MARGIN_SIGMAS * noise.sigma_m(z)
     on = (np.abs(slope * z + plane[3]) < margin_m) & (z > 0)
     count, number = cv2.connectedComponents(on.astype(np.uint8), connectivity=4)
-    seen_m2 = (z[on] / focal_px) ** 2
+    seen_m2 = (z[on] / camera.fx) * (z[on] / camera.fy)
     # A surface seen at a slant is larger than it looks.
     area_m2 = seen_m2 / np.maximum(np.abs(slope[on]), STEEPEST)
     return number, np.bincount(number[on], weights=area_m2, minlength=count)

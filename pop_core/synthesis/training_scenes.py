@@ -41,12 +41,10 @@ class TrainingPerson:
     Args:
         shared_points: The 15 points, camera frame [m]; hidden ones too.
         shared_state: A JointState per point.
-        kind: Kind of the pose.
     """
 
     shared_points: Float[np.ndarray, '15 3']
     shared_state: Int[np.ndarray, '15']
-    kind: str
 
     @property
     def visible(self) -> Bool[np.ndarray, '15']:
@@ -135,8 +133,7 @@ class TrainingScenes:
         states = joint_states(p, alone.depth_m, part, others_m, layout.camera)
         nose = shared[SHARED_INDEX['head']]
         return TrainingPerson(
-            shared, shared_states(states, nose, alone.depth_m, others_m, layout.camera),
-            actor.kind)
+            shared, shared_states(states, nose, alone.depth_m, others_m, layout.camera))
 
 
 def _dark(

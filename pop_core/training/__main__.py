@@ -17,6 +17,7 @@ from pop_core.training.run import RunConfig, train
 from pop_core.training.run import validate as validated
 from pop_core.training.scene_writer import SHARD_SCENES, SceneKind, write_shards
 from pop_core.training.trainer import (
+    CheckpointError,
     TrainConfig,
     Trainer,
     config_of,
@@ -43,7 +44,7 @@ Mocap = Annotated[Path | None, typer.Option(
 def scenes(
     out: Annotated[Path, typer.Option('--out', help='Folder of packed scenes.')],
     count: Annotated[int, typer.Option('--count', min=1, help='Number of scenes.')] = 25_000,
-    seed: Annotated[int, typer.Option('--seed', min=0, help='Decides the scenes.')] = 1,
+    seed: Annotated[int, typer.Option('--seed', min=1, help='Decides the scenes.')] = 1,
     size: Size = 'small',
     workers: Annotated[int, typer.Option('--workers', min=1, help='Processes.')] = 1,
     mocap: Mocap = None,
@@ -117,8 +118,12 @@ def validate(
     config = config_of(read_checkpoint(checkpoint), checkpoint)
     trainer = Trainer(torch.device('cpu'), config)
     trainer.load(checkpoint)
-    size = next(IMAGES[name] for name, known in SIZES.items() if known == config)
-    run = RunConfig(out=checkpoint.parent, minutes=0.0, size=size, validation=validation)
+    name = next((name for name, known in SIZES.items() if known == config), None)
+    if name is None:
+        raise CheckpointError(
+            f'{checkpoint}: expected a network of --size {", ".join(SIZES)}, found {config}')
+    run = RunConfig(
+        out=checkpoint.parent, minutes=0.0, size=IMAGES[name], validation=validation)
     for name, value in validated(trainer, run).items():
         typer.echo(f'{name:12} {value:.4f}')
 

@@ -14,7 +14,7 @@ from pop_core.body.default_body import default_body
 from pop_core.synthesis.coarse_body import coarse_body
 from pop_core.synthesis.training_scenes import TrainingScenes
 from pop_core.training.close_scenes import FINE_FOCAL_PX, FINE_SIZE, CloseScenes
-from pop_core.training.shards import MARGIN_PX, ShardError, load_fitting, pack, save_shard
+from pop_core.training.shards import DAMAGED, MARGIN_PX, ShardError, load_fitting, pack, save_shard
 
 SHARD_SCENES = 256
 
@@ -28,7 +28,7 @@ def load_motions(path: Path) -> list[Float[np.ndarray, '23 3']]:
     try:
         with np.load(path, allow_pickle=False) as arrays:
             pose = arrays['pose'].astype(np.float64)
-    except (OSError, ValueError, KeyError) as error:
+    except DAMAGED as error:
         raise ShardError(f'{path}: expected an array "pose" (n, 24, 3), found: {error}') from None
     if pose.ndim != 3 or pose.shape[1:] != (24, 3):
         raise ShardError(f'{path}: expected "pose" (n, 24, 3), found {pose.shape}')

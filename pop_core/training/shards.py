@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import zipfile
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -16,6 +18,10 @@ from pop_core.synthesis.training_scenes import TrainingScene
 MAX_PEOPLE = 6
 MARGIN_PX = 16  # scenes are larger than the network's input by this: crops shift them
 OWNER_SHIFT = 4  # labels hold the class in their low bits and 1 + owner above
+
+
+# What numpy raises of a file that is no archive of arrays, or a damaged one.
+DAMAGED = (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile, zlib.error)
 
 
 class ShardError(PopError):
@@ -78,10 +84,17 @@ def load_shard(path: Path) -> Shard:
         ShardError: If the file is no shard.
     """
     try:
-        with np.load(path, allow_pickle=False) as arrays:
-            return Shard(**{field.name: arrays[field.name] for field in fields(Shard)})
-    except (OSError, ValueError, KeyError, EOFError) as error:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {field.name: file[field.name] for field in fields(Shard)}
+    except DAMAGED as error:
         raise ShardError(f'{path}: expected packed training scenes, found: {error}') from None
+    shapes = {name: array.shape for name, array in arrays.items()}
+    n, *size = shapes['depth_mm'] if arrays['depth_mm'].ndim == 3 else (-1, -1, -1)
+    if shapes != {
+            'depth_mm': (n, *size), 'labels': (n, *size), 'points': (n, MAX_PEOPLE, 15, 3),
+            'visible': (n, MAX_PEOPLE, 15), 'lens': (n, 4)}:
+        raise ShardError(f'{path}: expected packed training scenes, found arrays of {shapes}')
+    return Shard(**arrays)
 
 
 def load_fitting(path: Path, size: tuple[int, int]) -> Shard:

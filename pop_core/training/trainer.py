@@ -17,6 +17,8 @@ from pop_core.training.muon import Muon
 from pop_core.training.network import DepthNet, NetworkConfig
 from pop_core.training.targets import Batch, make_targets
 
+REQUIRED = {'network_config', 'averaged', 'history', 'images'}
+
 
 class CheckpointError(PopError):
     """A file of weights that is damaged or of another network."""
@@ -160,7 +162,7 @@ class Trainer:
             self.network.load_state_dict(state.get('network', state['averaged']))
             for name, content in state.get('optimisers', {}).items():
                 self.optimisers[name].load_state_dict(content)
-        except (RuntimeError, ValueError) as error:
+        except (RuntimeError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise CheckpointError(
                 f'{path}: expected weights of a network as {self.network.config}, found '
                 f'{state["network_config"]}') from error
@@ -170,8 +172,10 @@ class Trainer:
 
 
 def _has_bfloat16(device: torch.device) -> bool:
-    """Return whether bfloat16 is faster than float32: not where a processor only imitates it."""
-    return device.type == 'cuda' or bool(torch.cpu.get_capabilities().get('avx512_bf16', False))
+    """Return whether a device has bfloat16 itself: imitated it is slower than float32."""
+    if device.type == 'cuda':
+        return torch.cuda.is_bf16_supported(including_emulation=False)
+    return bool(torch.cpu.get_capabilities().get('avx512_bf16', False))
 
 
 def load_network(path: Path) -> DepthNet:
@@ -195,9 +199,10 @@ def config_of(state: Mapping[str, Any], path: Path) -> NetworkConfig:
     found, weights = state['network_config'], state['averaged']
     try:
         config = NetworkConfig(**found)
-        if sum(config.blocks) > len(weights):
+        # Every stage and block has weights: what states more is not built, however large.
+        if min(config.blocks) < 0 or sum(config.blocks) + len(config.widths) > len(weights):
             raise ValueError('more blocks than weights')
-        with torch.device('meta'):  # whatever size is stated, nothing is allocated
+        with torch.device('meta'):  # and what is built here has no memory
             DepthNet(config).load_state_dict(weights, assign=True)
     except (TypeError, ValueError, RuntimeError, AttributeError) as error:
         raise CheckpointError(
@@ -217,7 +222,7 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     except Exception as error:  # noqa: BLE001 - torch tells damaged files by many exceptions
         reason = ' '.join(str(error).split())[:120]
         raise CheckpointError(f'{path}: expected a checkpoint, found: {reason}') from None
-    if not isinstance(state, dict) or not {'network_config', 'averaged', 'history'} <= set(state):
+    if not isinstance(state, dict) or not REQUIRED <= set(state):
         raise CheckpointError(f'{path}: expected a checkpoint of the depth network, found another')
     return state
 

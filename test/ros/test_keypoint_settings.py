@@ -6,10 +6,11 @@ import numpy as np
 from support.onnx_files import save_network
 
 from pop_core.config import PipelineConfig
+from pop_core.keypoints.depth_votes import DepthNetConfig
 from pop_core.keypoints.fusion import FusionConfig
 from pop_core.keypoints.people_selection import PeopleConfig
 from pop_ros.frame_fitter import FrameFitter
-from pop_ros.keypoint_sources import keep_people, make_detector
+from pop_ros.keypoint_sources import apply_settings, keep_people, make_detector
 from pop_ros.node_config import NodeConfig
 
 STRICT = PeopleConfig(min_person_score=0.7)
@@ -47,3 +48,12 @@ def test_the_node_s_settings_reach_the_network_at_start_and_later(tmp_path: Path
     assert detector.config is STRICT
     fitter.configure(PipelineConfig(), NodeConfig())
     assert detector.config.min_person_score == PeopleConfig().min_person_score
+
+
+def test_settings_of_the_depth_network_reach_it_alone_and_among_others(tmp_path: Path) -> None:
+    alone, merged = make_detector('depth'), make_detector(f'depth,{yolo(tmp_path / "a.onnx")}')
+    config = PipelineConfig(depth_net=DepthNetConfig(min_person_score=0.6))
+    for detector in (alone, merged):
+        apply_settings(detector, config)
+    assert alone.config is config.depth_net
+    assert config.depth_net in [part.config for part in merged.people]

@@ -2,13 +2,17 @@
 
 import time
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
 from support.recording import Recording, record
 
 from pop_core.config import PipelineConfig
+from pop_core.keypoints.canonical_depth_kernels import read_depth
+from pop_core.keypoints.depth_mask_kernels import label_pixels
 from pop_core.keypoints.lifting import LiftingConfig
 from pop_core.keypoints.openpose_json import KeypointFileError
 from pop_core.rgbd import RgbdFrame
@@ -99,3 +103,14 @@ def test_loading_is_no_waiting(sources: SourceArguments) -> None:
     finally:
         made.stop()
     assert longest_s < 0.1 < time.monotonic() - began_s
+
+
+def test_kernels_of_the_embedded_network_are_there_before_the_first_frame() -> None:
+    with ProcessPoolExecutor(1, get_context('spawn')) as fresh:
+        assert fresh.submit(kernels_after_preparing).result(WAIT_S) == [True, True]
+
+
+def kernels_after_preparing() -> list[bool]:
+    """Return whether kernels of a look are loaded, those included that only people need."""
+    Looking(SourceArguments('depth'))(PipelineConfig())
+    return [bool(kernel.signatures) for kernel in (read_depth, label_pixels)]

@@ -30,8 +30,11 @@ def somebody(z_m, x_m=0.0, height_m=1.4):
 
 def view_of(camera, z_m, x_m=0.0, height_m=1.4):
     joints, surface_m = somebody(z_m, x_m, height_m)
-    fine = canonical_view(camera, FINEST * FOCAL_PX, FINEST * LARGEST_SIDE)
-    return close_view(FOCAL_PX, max(surface_m / SHOWN_AT_M, 1.0), joints, surface_m, fine), fine
+    fine = canonical_view(
+        camera, camera.ray_grid(), FINEST * FOCAL_PX, FINEST * LARGEST_SIDE)
+    enlarged = max(surface_m / SHOWN_AT_M, 1.0)
+    before_m = BEFORE_M if enlarged > 1.0 else np.inf
+    return close_view(FOCAL_PX, enlarged, joints, surface_m, fine, before_m), fine
 
 
 @pytest.mark.parametrize('enlarged', [1.0, 2.7])
@@ -53,7 +56,7 @@ def test_somebody_far_is_shown_as_large_and_as_thick_at_the_near_depth(z_m):
 
 def test_somebody_too_near_for_a_network_of_near_looks_is_shown_farther():
     joints, surface_m = somebody(1.0)
-    fine = canonical_view(VGA, FINEST * FOCAL_PX, FINEST * LARGEST_SIDE)
+    fine = canonical_view(VGA, VGA.ray_grid(), FINEST * FOCAL_PX, FINEST * LARGEST_SIDE)
     view = close_view(FOCAL_PX, 0.5, joints, surface_m, fine)
     ends = np.array([[-0.3, -0.4, 1.0], [0.3, 0.4, 1.0], [0.0, 0.0, 1.2]])
     shown = view.from_camera(ends)

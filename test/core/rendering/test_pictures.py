@@ -14,7 +14,6 @@ from pop_core.rendering.pictures import (
     extent_of,
     result_panels,
     result_picture,
-    undistorted_mask,
 )
 from pop_core.rendering.scene_view import FROM_ABOVE, FROM_THE_RIGHT, draw_scene, fitting_view
 from pop_core.rendering.shading import shade
@@ -206,20 +205,6 @@ def test_a_view_of_a_body_shows_its_mesh():
     with_body = draw_scene(plain_frame(np.nan), [shown], f, view)
     without = draw_scene(plain_frame(np.nan), [], f, view)
     assert (with_body != without).any(axis=2).mean() > 0.05
-
-
-def test_a_mask_of_a_distorted_image_moves_to_where_the_pinhole_sees_it():
-    camera = Camera(160, 120, 130.0, 130.0, 79.5, 59.5, 'plumb_bob',
-                    np.array([-0.3, 0.1, 0.0, 0.0, 0.0]))
-    point = np.array([[0.7, 0.5, 2.0]])
-    u, v = np.rint(camera.project(point)[0]).astype(int)
-    mask = np.zeros((120, 160), dtype=bool)
-    mask[v - 2: v + 3, u - 2: u + 3] = True
-    rows, columns = np.nonzero(undistorted_mask(mask, camera))
-    expected = camera.without_distortion().project(point)[0]
-    assert np.linalg.norm(expected - [u, v]) > 2.5  # the test would be empty otherwise
-    # half a pixel of rounding on either side, and what the block is stretched by
-    np.testing.assert_allclose([columns.mean(), rows.mean()], expected, atol=1.2)
 
 
 def test_near_is_brighter_than_far_and_missing_is_black():

@@ -1,5 +1,7 @@
 """Planes are found whichever way they face, people are none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.one_person import WALL_M, facing_person, photograph
@@ -39,7 +41,7 @@ def test_two_planes_are_two_and_their_pixels_are_told_apart() -> None:
     assert len(planes) == 2
     for plane in planes:
         number, area_m2 = pieces_of_plane(
-            plane, depth_m, CAMERA.ray_grid(), CAMERA.fx, NOISE)
+            plane, depth_m, CAMERA.ray_grid(), CAMERA, NOISE)
         z = abs(plane[3])
         columns = 70 if z < 2.5 else 90
         whole_m2 = columns * 120 * (z / CAMERA.fx) ** 2
@@ -48,13 +50,22 @@ def test_two_planes_are_two_and_their_pixels_are_told_apart() -> None:
         assert on[:, :70].mean() == pytest.approx(float(z < 2.5), abs=0.15)
 
 
+def test_areas_are_those_of_pixels_that_are_not_square() -> None:
+    tall = replace(CAMERA, fy=2.0 * CAMERA.fy)
+    depth_m = np.full((CAMERA.height, CAMERA.width), 2.0, dtype=np.float32)
+    plane = np.array([0.0, 0.0, -1.0, 2.0])
+    _, square = pieces_of_plane(plane, depth_m, CAMERA.ray_grid(), CAMERA, NOISE)
+    _, flat = pieces_of_plane(plane, depth_m, tall.ray_grid(), tall, NOISE)
+    assert flat.max() == pytest.approx(square.max() / 2.0)
+
+
 def test_people_are_not_flat() -> None:
     body = default_body()
     frame = photograph(body, facing_person(np.zeros(10)))
     plane, *others = find_planes(frame.depth_m, frame.camera, NOISE)
     assert not others
     number, _ = pieces_of_plane(
-        plane, frame.depth_m, frame.camera.ray_grid(), frame.camera.fx, NOISE)
+        plane, frame.depth_m, frame.camera.ray_grid(), frame.camera, NOISE)
     wall = frame.depth_m == WALL_M
     assert (number > 0)[wall].all()
     assert not (number > 0)[~wall].any()

@@ -85,7 +85,7 @@ def test_looks_to_learn_from_are_those_that_the_detector_shows(enlarged):
     nobody = np.full(depth_m.shape, -1, dtype=np.int8)
     scene = TrainingScene(depth_m, nobody, nobody, (), camera)
     joints = np.array([[-0.3, -0.4, 3.0], [0.4, 0.3, 3.0]])
-    fine = canonical_view(camera, camera.fx)
+    fine = canonical_view(camera, camera.ray_grid(), camera.fx)
     view = close_view(80.0, enlarged, joints, 3.0, fine)
     shown_m = np.nan_to_num(seen_from_near(scene, view).depth_m)
     expected_m = close_depth(depth_m, fine, view)

@@ -41,9 +41,36 @@ def test_classes_and_labels_are_inverse_on_the_parts_that_stand_for_others():
     np.testing.assert_array_equal(CLASS_MIRROR[CLASS_MIRROR], np.arange(16))
 
 
-def test_a_damaged_shard_is_told(tmp_path):
-    (tmp_path / 'a.npz').write_bytes(b'no zip')
-    with pytest.raises(ShardError, match='expected packed training scenes'):
+def no_archive(path, _shard):
+    path.write_bytes(b'no zip')
+
+
+def cut_short(path, shard):
+    save_shard(shard, path)
+    path.write_bytes(path.read_bytes()[:-200])
+
+
+def one_array(path, shard):
+    with path.open('wb') as file:
+        np.save(file, shard.lens)
+
+
+def flat_depth(path, shard):
+    np.savez(path, **(vars_of(shard) | {'depth_mm': shard.depth_mm[0]}))
+
+
+def fewer_labels(path, shard):
+    np.savez(path, **(vars_of(shard) | {'labels': shard.labels[:-1]}))
+
+
+def vars_of(shard):
+    return {name: getattr(shard, name) for name in type(shard).__slots__}
+
+
+@pytest.mark.parametrize('damage', [no_archive, cut_short, one_array, flat_depth, fewer_labels])
+def test_a_damaged_shard_is_told(small_scenes, tmp_path, damage):
+    damage(tmp_path / 'a.npz', pack(small_scenes[:2]))
+    with pytest.raises(ShardError, match=r'a\.npz: expected packed training scenes'):
         load_shard(tmp_path / 'a.npz')
 
 

@@ -237,7 +237,8 @@ def test_weights_of_another_size_are_told(tmp_path):
 
 @pytest.mark.parametrize('config', [
     {'layers': 3}, {'widths': 'many'}, {'widths': [10**9] * 5, 'blocks': [1] * 4},
-    {'widths': [4] * 5, 'blocks': [10**9] * 4}, [1, 2]])
+    {'widths': [4] * 5, 'blocks': [10**9] * 4}, {'blocks': [10**9, -10**9, 1, 1]},
+    {'widths': [4] * 10**5, 'blocks': [0] * (10**5 - 1)}, [1, 2]])
 def test_a_checkpoint_that_states_no_size_of_its_weights_is_told(tmp_path, config):
     trainer().save_weights(tmp_path / 'w.pt')
     state = torch.load(tmp_path / 'w.pt', weights_only=True)
@@ -246,6 +247,24 @@ def test_a_checkpoint_that_states_no_size_of_its_weights_is_told(tmp_path, confi
         load_network(tmp_path / 'w.pt')
     with pytest.raises(CheckpointError, match='expected weights of a depth network'):
         trainer().load(tmp_path / 'w.pt')
+
+
+@pytest.mark.parametrize('missing', ['images', 'history', 'averaged'])
+def test_a_checkpoint_that_lacks_something_is_told(tmp_path, missing):
+    trainer().save_weights(tmp_path / 'w.pt')
+    state = torch.load(tmp_path / 'w.pt', weights_only=True)
+    del state[missing]
+    torch.save(state, tmp_path / 'w.pt')
+    with pytest.raises(CheckpointError, match='expected a checkpoint of the depth network'):
+        trainer().load(tmp_path / 'w.pt')
+
+
+def test_a_checkpoint_with_other_optimisers_is_told(tmp_path):
+    trainer().save(tmp_path / 'a.pt')
+    state = torch.load(tmp_path / 'a.pt', weights_only=True)
+    torch.save(state | {'optimisers': {'momentum': {}}}, tmp_path / 'a.pt')
+    with pytest.raises(CheckpointError, match='expected weights of a network'):
+        trainer().load(tmp_path / 'a.pt')
 
 
 def test_scenes_of_another_size_in_the_way_are_told(small_scenes, tmp_path):

@@ -1,0 +1,34 @@
+"""Frames are what they promise, or are refused."""
+
+import numpy as np
+import pytest
+
+from pop_core.errors import FrameError
+from pop_core.geometry.camera import Camera
+from pop_core.rgbd import RgbdFrame, clean_depth
+
+CAMERA = Camera(8, 6, 10.0, 10.0, 3.5, 2.5)
+RGB = np.zeros((6, 8, 3), dtype=np.uint8)
+
+
+def depth_with(value: float) -> np.ndarray:
+    depth_m = np.full((6, 8), 2.0, dtype=np.float32)
+    depth_m[2, 3] = value
+    return depth_m
+
+
+def test_another_size_than_the_camera_s_is_told() -> None:
+    with pytest.raises(FrameError, match='of 8x6 as the camera says, found colour'):
+        RgbdFrame(RGB[:5], depth_with(2.0)[:5], CAMERA)
+
+
+@pytest.mark.parametrize('value', [0.0, -1.0, np.inf, -np.inf])
+def test_what_is_no_distance_is_told_with_what_to_do(value: float) -> None:
+    with pytest.raises(FrameError, match=r'found 1 pixels of 0.*clean_depth'):
+        RgbdFrame(RGB, depth_with(value), CAMERA)
+    cleaned = RgbdFrame(RGB, clean_depth(depth_with(value)), CAMERA)
+    assert np.isnan(cleaned.depth_m[2, 3])
+
+
+def test_pixels_without_a_measurement_are_fine() -> None:
+    assert np.isnan(RgbdFrame(RGB, depth_with(np.nan), CAMERA).depth_m).sum() == 1
