@@ -96,7 +96,11 @@ def point_cloud(
     """
     v, u = np.nonzero(mask & np.isfinite(frame.depth_m))
     uv = np.column_stack([u, v]).astype(np.float64)
-    return frame.camera.unproject(uv, frame.depth_m[v, u].astype(np.float64)), uv
+    camera, seen = frame.camera, uv
+    if camera.is_distorted:
+        at = lens_maps(camera).of_camera
+        camera, seen = camera.without_distortion(), np.column_stack([at.u[v, u], at.v[v, u]])
+    return camera.unproject(seen, frame.depth_m[v, u].astype(np.float64)), uv
 
 
 def flying_pixels(

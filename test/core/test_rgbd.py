@@ -5,7 +5,7 @@ import pytest
 
 from pop_core.errors import FrameError
 from pop_core.geometry.camera import Camera
-from pop_core.rgbd import RgbdFrame, clean_depth
+from pop_core.rgbd import RgbdFrame, clean_depth, point_cloud
 
 CAMERA = Camera(8, 6, 10.0, 10.0, 3.5, 2.5)
 RGB = np.zeros((6, 8, 3), dtype=np.uint8)
@@ -32,3 +32,13 @@ def test_what_is_no_distance_is_told_with_what_to_do(value: float) -> None:
 
 def test_pixels_without_a_measurement_are_fine() -> None:
     assert np.isnan(RgbdFrame(RGB, depth_with(np.nan), CAMERA).depth_m).sum() == 1
+
+
+def test_points_of_a_distorted_image_lie_on_the_rays_of_their_pixels() -> None:
+    bent = Camera(160, 120, 130.0, 132.0, 81.0, 58.0, 'plumb_bob',
+                  np.array([-0.3, 0.1, 0.001, -0.002, 0.0]))
+    depth_m = np.random.default_rng(0).uniform(0.5, 4.0, (120, 160)).astype(np.float32)
+    frame = RgbdFrame(np.zeros((120, 160, 3), dtype=np.uint8), depth_m, bent)
+    points, uv = point_cloud(frame, depth_m > 1.0)
+    assert len(points) == (depth_m > 1.0).sum()
+    np.testing.assert_allclose(bent.project(points), uv, atol=1e-3)
