@@ -138,7 +138,8 @@ def observed_points(
     depth_m = scene.frame.depth_m
     with np.errstate(invalid='ignore'):
         near_truth = np.abs(depth_m - scene.true_depth_m) < 0.15
-    points, _ = point_cloud(scene.frame, person.mask & near_truth & ~flying_pixels(depth_m))
+    flying = flying_pixels(depth_m, scene.frame.camera.fx)
+    points, _ = point_cloud(scene.frame, person.mask & near_truth & ~flying)
     rng = np.random.default_rng([scene.seed, 11])
     if len(points) > MOST_POINTS:
         points = points[rng.choice(len(points), MOST_POINTS, replace=False)]

@@ -12,8 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Float32
 
-LAG_PX = 6  # further apart than the spots of noise that stereo makes are wide
-STEP_PX = 3  # every so many pixels are enough
+from pop_core.geometry.camera import USUAL_FOCAL_PX
+
+# At USUAL_FOCAL_PX: further apart than the spots of noise that stereo makes are wide, and every so
+# many are enough. Depth aligned to a finer colour image repeats its pixels.
+LAG_PX, STEP_PX = 6.0, 3.0
+LEAST_LAG_PX = 3
 LEAST_SAMPLES = 200
 BASE_M = 0.0012  # no sensor is better than this at any distance
 MAD_TO_SIGMA = 1.4826
@@ -38,9 +42,16 @@ class DepthNoise:
 USUAL_NOISE = DepthNoise()
 
 
-def estimate_depth_noise(depth_m: Float32[np.ndarray, 'h w']) -> DepthNoise:
-    """Return the noise of a depth image [m]; the usual one where too little was measured."""
-    bends = np.concatenate([_bends(depth_m), _bends(depth_m.T)])
+def estimate_depth_noise(depth_m: Float32[np.ndarray, 'h w'], focal_px: float) -> DepthNoise:
+    """Return the noise of a depth image; the usual one where too little was measured.
+
+    Args:
+        depth_m: Depth [m], NaN where nothing was measured.
+        focal_px: Focal length of the image.
+    """
+    finer = focal_px / USUAL_FOCAL_PX
+    lag, step = max(round(LAG_PX * finer), LEAST_LAG_PX), max(round(STEP_PX * finer), 1)
+    bends = np.concatenate([_bends(depth_m, lag, step), _bends(depth_m.T, lag, step)])
     bends = bends[np.isfinite(bends)]
     if len(bends) < LEAST_SAMPLES:
         return USUAL_NOISE
@@ -48,11 +59,13 @@ def estimate_depth_noise(depth_m: Float32[np.ndarray, 'h w']) -> DepthNoise:
     return DepthNoise(float(MAD_TO_SIGMA * np.median(np.abs(bends)) / np.sqrt(6.0)))
 
 
-def _bends(depth_m: Float32[np.ndarray, 'h w']) -> Float32[np.ndarray, 'n']:
+def _bends(
+    depth_m: Float32[np.ndarray, 'h w'], lag: int, step: int
+) -> Float32[np.ndarray, 'n']:
     """Return second differences of inverse depth along rows; NaN where one is missing."""
-    end = max(depth_m.shape[1] - 2 * LAG_PX, 0)
+    end = max(depth_m.shape[1] - 2 * lag, 0)
     before, here, after = (
-        _inverse(depth_m[::STEP_PX, k: end + k: STEP_PX]) for k in (0, LAG_PX, 2 * LAG_PX))
+        _inverse(depth_m[::step, k: end + k: step]) for k in (0, lag, 2 * lag))
     return (before - 2.0 * here + after).reshape(-1)
 
 

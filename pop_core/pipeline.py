@@ -108,7 +108,7 @@ class BodyPipeline:
         with watch.step('detect'):
             detections = self.detector.detect(frame)
         with watch.step('undistort'):
-            seen = undistort_frame(frame)
+            seen = undistort_frame(frame, colour=False)
             detections = [undistort_detection(d, frame.camera) for d in detections]
         with self._blas.limit(limits=1, user_api='blas'):
             bodies, statuses = self._fit_people(seen, detections, watch)
@@ -124,7 +124,7 @@ class BodyPipeline:
         distance_m = [joints.distance_m for joints in lifted]
         with watch.step('ground'):
             ground = find_ground(frame) if self.config.use_ground else None
-            noise = estimate_depth_noise(frame.depth_m)
+            noise = estimate_depth_noise(frame.depth_m, frame.camera.fx)
         statuses = [self.admit(joints) for joints in lifted]
         scene = Scene(frame, ground, noise, np.zeros(frame.depth_m.shape, dtype=bool))
         bodies: list[BodyEstimate] = []
@@ -288,7 +288,8 @@ def covers_keypoints(taken: Bool[np.ndarray, 'h w'], detection: Detection) -> bo
 
 def without_depth(frame: RgbdFrame, taken: Bool[np.ndarray, 'h w']) -> RgbdFrame:
     """Return a frame with nothing measured at some pixels: nobody else is lifted onto them."""
-    depth_m = np.where(taken, np.float32(np.nan), frame.depth_m)
+    depth_m = frame.depth_m.copy()
+    np.putmask(depth_m, taken, np.nan)
     return replace(frame, depth_m=depth_m)
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32, UInt8
 
 from pop_core.errors import FrameError
-from pop_core.geometry.camera import Camera
+from pop_core.geometry.camera import USUAL_FOCAL_PX, Camera
 from pop_core.geometry.flying_pixel_kernels import flying
 from pop_core.geometry.lens_maps import lens_maps
 
@@ -53,19 +54,23 @@ def clean_depth(depth_m: Float32[np.ndarray, 'h w']) -> Float32[np.ndarray, 'h w
         return np.where((depth_m > 0) & np.isfinite(depth_m), depth_m, np.float32(np.nan))
 
 
-def undistort_frame(frame: RgbdFrame) -> RgbdFrame:
+def undistort_frame(frame: RgbdFrame, *, colour: bool = True) -> RgbdFrame:
     """Return the frame as a pure pinhole of the same intrinsics sees it.
 
     Depth is sampled by nearest neighbour: interpolation would invent points between a limb and
     the wall behind it.
+
+    Args:
+        frame: The frame as the camera gave it.
+        colour: Whether colours are wanted; whoever looks at depth alone gets them as they are.
     """
     camera = frame.camera
     if not camera.is_distorted:
         return frame
     seen = lens_maps(camera).of_pinhole
     return RgbdFrame(
-        seen.interpolated(frame.rgb), seen.nearest(frame.depth_m, float('nan')),
-        camera.without_distortion(), frame.stamp_ns)
+        seen.interpolated(frame.rgb) if colour else frame.rgb,
+        seen.nearest(frame.depth_m, float('nan')), camera.without_distortion(), frame.stamp_ns)
 
 
 def undistort_mask(
@@ -94,8 +99,10 @@ def point_cloud(
     Returns:
         Points in the camera frame [m] and their pixels (u, v), in row order.
     """
-    v, u = np.nonzero(mask & np.isfinite(frame.depth_m))
-    uv = np.column_stack([u, v]).astype(np.float64)
+    shown = cv2.findNonZero((mask & (frame.depth_m > 0)).view(np.uint8))
+    uv = np.zeros((0, 2), dtype=np.int32) if shown is None else shown.reshape(-1, 2)
+    u, v = uv.T
+    uv = uv.astype(np.float64)
     camera, seen = frame.camera, uv
     if camera.is_distorted:
         at = lens_maps(camera).of_camera
@@ -104,13 +111,20 @@ def point_cloud(
 
 
 def flying_pixels(
-    depth_m: Float32[np.ndarray, 'h w'], jump_ratio: float = 0.02
+    depth_m: Float32[np.ndarray, 'h w'], focal_px: float, jump_ratio: float = 0.02
 ) -> Bool[np.ndarray, 'h w']:
     """Return pixels whose depth lies between two surfaces, as sensors give at edges.
 
     A pixel flies when a neighbour on one side is nearer and the opposite one is farther, both by
-    more than `jump_ratio` of its depth: no surface seen by a camera does that.
+    more than `jump_ratio` of its depth: no surface seen by a camera does that. Depth aligned to a
+    finer colour image repeats its pixels: neighbours there are farther apart.
+
+    Args:
+        depth_m: Depth [m], NaN where nothing was measured.
+        focal_px: Focal length of the image.
+        jump_ratio: Least jump to either side, as a share of the pixel's depth.
     """
     out = np.empty(depth_m.shape, dtype=bool)
-    flying(np.ascontiguousarray(depth_m), jump_ratio, out)
+    reach = max(round(focal_px / USUAL_FOCAL_PX), 1)
+    flying(np.ascontiguousarray(depth_m), jump_ratio, reach, out)
     return out

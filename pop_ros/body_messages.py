@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from geometry_msgs.msg import PoseArray
@@ -14,7 +15,7 @@ from pop_core.body.model import BodyModel
 from pop_core.estimate import BodyEstimate, FrameResult
 from pop_core.rendering.overlay import draw_people
 from pop_core.rendering.shown_body import shown
-from pop_core.rgbd import RgbdFrame, undistort_frame
+from pop_core.rgbd import RgbdFrame, undistort_frame, undistort_mask
 from pop_ros import pop_messages, to_messages
 from pop_ros.humans import HUMANS, HumansFrame
 from pop_ros.image_messages import color_message
@@ -134,6 +135,7 @@ class BodyMessages:
     def _overlay(self, result: FrameResult, frame: RgbdFrame, header: Header) -> Image:
         # Meshes are drawn as a pinhole sees them.
         seen = undistort_frame(frame)
-        people = [shown(body) for body in result.bodies]
+        people = [replace(shown(body), mask=undistort_mask(body.mask, frame.camera))
+                  for body in result.bodies]
         picture = draw_people(seen.rgb, people, self._model.f, seen.camera, seen.depth_m)
         return color_message(picture, header)

@@ -21,6 +21,9 @@ from pop_ros.message_error import BadMessageError
 
 COLOR_CHANNELS = {'rgb8': 3, 'bgr8': 3, 'rgba8': 4, 'bgra8': 4, 'mono8': 1, '8UC1': 1, '8UC3': 3}
 DEPTH_TYPES = {'16UC1': 'u2', 'mono16': 'u2', '32FC1': 'f4'}
+# Of depth in millimetres, 0 where nothing was measured (REP 118).
+METRES = np.arange(2**16, dtype=np.float32) * np.float32(0.001)
+METRES[0] = np.nan
 TO_RGB = {
     'bgr8': cv2.COLOR_BGR2RGB, '8UC3': cv2.COLOR_BGR2RGB, 'rgba8': cv2.COLOR_RGBA2RGB,
     'bgra8': cv2.COLOR_BGRA2RGB, 'mono8': cv2.COLOR_GRAY2RGB, '8UC1': cv2.COLOR_GRAY2RGB,
@@ -82,12 +85,7 @@ def decode_depth(message: Any) -> Float32[np.ndarray, 'h w']:
     dtype = np.dtype(kind).newbyteorder('>' if message.is_bigendian else '<')
     rows = _rows(message, dtype.itemsize, 'depth image')
     raw = np.ascontiguousarray(rows).view(dtype)
-    if kind == 'u2':
-        depth_m = raw.astype(np.float32)
-        depth_m *= np.float32(0.001)
-    else:
-        depth_m = raw.astype(np.float32)
-    return clean_depth(depth_m)
+    return METRES[raw] if kind == 'u2' else clean_depth(raw.astype(np.float32))
 
 
 def camera_from_info(info: Any) -> Camera:

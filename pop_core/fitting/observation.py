@@ -161,7 +161,8 @@ def observe(
     lifted = lifted.without_guesses()
     camera = window.camera(frame.camera)
     depth_m = window.cut(frame.depth_m)
-    own = np.isfinite(depth_m) & ~window.cut(others) & ~window.cut(flying_pixels(frame.depth_m))
+    flying = window.cut(flying_pixels(frame.depth_m, frame.camera.fx))
+    own = np.isfinite(depth_m) & ~window.cut(others) & ~flying
     parts = None if labels is None else window.cut(labels)
     rays = camera.ray_grid()
     if ground is not None:

@@ -15,6 +15,8 @@ from jaxtyping import Float
 from pop_core.errors import CameraError
 
 FOCAL_PX = (1.0, 1e6)  # no lens is shorter or longer
+# Of the sensors of 640x480 pixels that constants in pixels were chosen for.
+USUAL_FOCAL_PX = 525.0
 DISTORTION_LENGTHS = {
     '': (0,),
     'plumb_bob': (0, 4, 5),
@@ -88,12 +90,17 @@ class Camera:
         """Return whether any distortion coefficient differs from zero."""
         return bool(np.any(self.d))
 
-    def sees_like(self, other: Camera) -> bool:
-        """Return whether two cameras see the same points at the same pixels."""
+    def sees_like(self, other: Camera, within_px: float = 0.0) -> bool:
+        """Return whether two cameras see the same points at the same pixels.
+
+        Args:
+            other: The other camera.
+            within_px: By how much focal lengths and principal points may differ.
+        """
         kind = self.width, self.height, self.distortion_model
-        return (
+        return bool(
             kind == (other.width, other.height, other.distortion_model)
-            and np.array_equal(self.K, other.K) and np.array_equal(self.d, other.d))
+            and (np.abs(self.K - other.K) <= within_px).all() and np.array_equal(self.d, other.d))
 
     def project(self, p_camera: Float[np.ndarray, 'n 3']) -> Float[np.ndarray, 'n 2']:
         """Return pixels of points in the camera frame [m]; points with z <= 0 give NaN."""

@@ -7,8 +7,11 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def flying(depth, jump_ratio, out):
-    """Mark pixels of depth (h, w) that lie between two surfaces, along a row or a column."""
+def flying(depth, jump_ratio, reach, out):
+    """Mark pixels of depth (h, w) that lie between two surfaces, along a row or a column.
+
+    Pixels `reach` to either side are compared: neighbours may repeat what was measured once.
+    """
     h, w = depth.shape
     ratio = np.float32(jump_ratio)
     for y in range(h):
@@ -16,9 +19,9 @@ def flying(depth, jump_ratio, out):
             here = depth[y, x]
             low, high = here - here * ratio, here + here * ratio
             out[y, x] = False
-            if 0 < x < w - 1:
-                before, after = depth[y, x - 1], depth[y, x + 1]
+            if reach <= x < w - reach:
+                before, after = depth[y, x - reach], depth[y, x + reach]
                 out[y, x] = (before < low and after > high) or (before > high and after < low)
-            if 0 < y < h - 1 and not out[y, x]:
-                before, after = depth[y - 1, x], depth[y + 1, x]
+            if reach <= y < h - reach and not out[y, x]:
+                before, after = depth[y - reach, x], depth[y + reach, x]
                 out[y, x] = (before < low and after > high) or (before > high and after < low)

@@ -7,33 +7,30 @@ from numba import njit
 
 from pop_core.geometry.nearest_pixel_kernels import nearest_pixel, nearest_rows
 
+# From a pixel to those below, above, to the right and to the left of it.
+DOWN, ACROSS = (1, -1, 0, 0), (0, 0, 1, -1)
+
 
 @njit(cache=True, nogil=True)
-def _listed(mask):
-    """Return the pixels (y, x) of a mask, with room for all others behind them, and how many."""
+def _rim(mask, allowed):
+    """Return the pixels (y, x) of a mask beside which others may join, and how many these are.
+
+    There is room for all others behind them. Each of the four neighbours is asked for by itself,
+    since a loop over them takes far longer.
+    """
     h, w = mask.shape
     queue = np.empty((h * w, 2), dtype=np.int32)
     count = 0
     for y in range(h):
         for x in range(w):
-            if mask[y, x]:
+            if mask[y, x] and (
+                    (y > 0 and allowed[y - 1, x] and not mask[y - 1, x])
+                    or (y < h - 1 and allowed[y + 1, x] and not mask[y + 1, x])
+                    or (x > 0 and allowed[y, x - 1] and not mask[y, x - 1])
+                    or (x < w - 1 and allowed[y, x + 1] and not mask[y, x + 1])):
                 queue[count, 0], queue[count, 1] = y, x
                 count += 1
     return queue, count
-
-
-@njit(cache=True, nogil=True)
-def _beside(y, x, k):
-    """Return the pixel below, above, to the right or to the left of one, for k of 0 to 3."""
-    return (y + (1 if k == 0 else -1 if k == 1 else 0),
-            x + (1 if k == 2 else -1 if k == 3 else 0))
-
-
-@njit(cache=True, nogil=True)
-def _may_join(y, x, inside, allowed):
-    """Return whether a pixel is one of the image, allowed, and not inside yet."""
-    h, w = inside.shape
-    return 0 <= y < h and 0 <= x < w and not inside[y, x] and allowed[y, x]
 
 
 @njit(cache=True, nogil=True)
@@ -67,16 +64,16 @@ def segment(depth, rendered, own, gamma, tolerance, blur, blur_per_square, growt
                 rendered[y, x] != np.inf and own[y, x]
                 and abs(depth[y, x] - rendered[y, x])
                 < tolerance + _noise(depth[y, x], blur, blur_per_square, tolerance))
-    queue, tail = _listed(out)
+    queue, tail = _rim(out, own)
     head = 0
     while head < tail:
         y, x = queue[head, 0], queue[head, 1]
         head += 1
+        noise = _noise(depth[y, x], blur, blur_per_square, tolerance)
         for k in range(4):
-            ny, nx = _beside(y, x, k)
-            if not _may_join(ny, nx, out, own):
+            ny, nx = y + DOWN[k], x + ACROSS[k]
+            if not (0 <= ny < h and 0 <= nx < w) or out[ny, nx] or not own[ny, nx]:
                 continue
-            noise = _noise(depth[y, x], blur, blur_per_square, tolerance)
             if not abs(depth[ny, nx] - depth[y, x]) < gamma + noise:
                 continue
             squared, body_y, body_x = nearest_pixel(row, ny, nx, farthest)
@@ -93,14 +90,15 @@ def segment(depth, rendered, own, gamma, tolerance, blur, blur_per_square, growt
 @njit(cache=True, nogil=True)
 def flood(inside, allowed):
     """Add to `inside` the allowed pixels that hang together with it, side by side."""
-    queue, tail = _listed(inside)
+    h, w = inside.shape
+    queue, tail = _rim(inside, allowed)
     head = 0
     while head < tail:
         y, x = queue[head, 0], queue[head, 1]
         head += 1
         for k in range(4):
-            ny, nx = _beside(y, x, k)
-            if not _may_join(ny, nx, inside, allowed):
+            ny, nx = y + DOWN[k], x + ACROSS[k]
+            if not (0 <= ny < h and 0 <= nx < w) or inside[ny, nx] or not allowed[ny, nx]:
                 continue
             inside[ny, nx] = True
             queue[tail, 0], queue[tail, 1] = ny, nx
@@ -124,15 +122,16 @@ def creep(inside, allowed, depth, step, step_per_square, centres, reach, fx, fy,
         cx: Column of the principal point [px].
         cy: Row of it.
     """
-    queue, tail = _listed(inside)
+    h, w = inside.shape
+    queue, tail = _rim(inside, allowed)
     head = 0
     while head < tail:
         y, x = queue[head, 0], queue[head, 1]
         head += 1
         here = depth[y, x]
         for k in range(4):
-            ny, nx = _beside(y, x, k)
-            if not _may_join(ny, nx, inside, allowed):
+            ny, nx = y + DOWN[k], x + ACROSS[k]
+            if not (0 <= ny < h and 0 <= nx < w) or inside[ny, nx] or not allowed[ny, nx]:
                 continue
             z = depth[ny, nx]
             if not abs(z - here) < step + step_per_square * here * here:

@@ -31,10 +31,12 @@ class Gap:
     Args:
         duration_s: Time between their stamps [s].
         skipped: Frames of the camera in between that were left out for lack of time.
+        is_hurried: Whether any were left out lately.
     """
 
     duration_s: float
     skipped: int = 0
+    is_hurried: bool = False
 
     @property
     def is_long(self) -> bool:
@@ -52,12 +54,17 @@ class Gap:
         return self.of_camera_s > LONG_GAP_S
 
     @property
+    def has_time(self) -> bool:
+        """Return whether a frame may wait for a fit: of a slow camera, that is slow enough."""
+        return self.is_of_slow_camera and not self.is_hurried
+
+    @property
     def patience_s(self) -> float:
         """Return for how long a frame may wait for what is made beside the following [s].
 
         Whoever had to leave frames out has no time to wait.
         """
-        if self.is_of_slow_camera:
+        if self.has_time:
             return math.inf
         if self.skipped > 0 or self.of_camera_s < WAITING_S:
             return 0.0

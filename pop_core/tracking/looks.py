@@ -166,7 +166,7 @@ def look_for_people(watcher: Watcher, frame: RgbdFrame, undistorted: RgbdFrame) 
             watcher.config.lifting)
     with watch.step('ground'):
         ground = find_ground(undistorted) if watcher.config.use_ground else None
-        noise = estimate_depth_noise(undistorted.depth_m)
+        noise = estimate_depth_noise(undistorted.depth_m, undistorted.camera.fx)
     return Seen(found, ground, noise, watch.times_ms)
 
 

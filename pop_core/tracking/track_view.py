@@ -40,7 +40,7 @@ def observe_track(
     depth_m = window.cut(frame.depth_m)
     dense = Window(window.left, window.top, window.width, window.height, 1)
     stride = window.stride
-    flying = flying_pixels(dense.cut(frame.depth_m))[::stride, ::stride]
+    flying = flying_pixels(dense.cut(frame.depth_m), frame.camera.fx)[::stride, ::stride]
     own = np.isfinite(depth_m) & ~window.cut(others) & ~flying
     if ground is not None:
         own &= ~ground.floor_pixels(depth_m, camera)

@@ -38,6 +38,10 @@ from pop_core.tracking.track import PersonTrack, new_track
 from pop_core.tracking.tracking_config import TrackingConfig
 
 ASTRAY_M = 0.3  # doubt of the place of somebody whom keypoints contradict
+CALM_FRAMES = 30  # since one was left out: before, nothing is waited for
+# Focal length and principal point that move by less are the same; by a larger share of the focal
+# length, another camera's.
+SAME_CAMERA_PX, REFOCUSED_SHARE = 0.5, 0.01
 
 
 class BodyTracker:
@@ -65,7 +69,7 @@ class BodyTracker:
         self._late_limbs = LateLimbs(searching)
         self._next_id = 0
         self._tracks: list[PersonTrack] = []
-        self._gap = Gap(0.0)
+        self._gap, self._in_time = Gap(0.0), CALM_FRAMES
         self._last: tuple[Camera, int] | None = None
         self._ground: Ground | None = None
         self._noise = USUAL_NOISE
@@ -98,14 +102,17 @@ class BodyTracker:
                 for an earlier one that was looked at meanwhile.
         """
         watch = Stopwatch()
+        frame = self._of_known_camera(frame)
         if self._is_another_recording(frame):
             self._forget()
+        self._in_time = 0 if skipped else self._in_time + 1
         self._gap = Gap(
-            np.inf if self._last is None else (frame.stamp_ns - self._last[1]) * 1e-9, skipped)
+            np.inf if self._last is None else (frame.stamp_ns - self._last[1]) * 1e-9, skipped,
+            is_hurried=self._in_time < CALM_FRAMES)
         self._last = frame.camera, frame.stamp_ns
-        self._late_limbs.begin(frame.stamp_ns, has_time=self._gap.is_of_slow_camera)
+        self._late_limbs.begin(frame.stamp_ns, has_time=self._gap.has_time)
         with watch.step('undistort'):
-            seen = undistort_frame(frame)
+            seen = undistort_frame(frame, colour=False)
         is_late, has_begun = self._fresh.poll(), False
         fresh = self._fresh.take(None)
         if fresh is not None:
@@ -133,11 +140,21 @@ class BodyTracker:
         self._last, self._ground = None, None
         self._schedule = DetectionSchedule(self.config)
 
+    def _of_known_camera(self, frame: RgbdFrame) -> RgbdFrame:
+        """Return a frame with the camera of the last one, where it moved by less than matters.
+
+        What is computed once per camera stays.
+        """
+        if self._last is None or not self._last[0].sees_like(frame.camera, SAME_CAMERA_PX):
+            return frame
+        return replace(frame, camera=self._last[0])
+
     def _is_another_recording(self, frame: RgbdFrame) -> bool:
         if self._last is None:
             return False
         camera, stamp_ns = self._last
-        return frame.stamp_ns < stamp_ns or not camera.sees_like(frame.camera)
+        refocused_px = REFOCUSED_SHARE * camera.fx
+        return frame.stamp_ns < stamp_ns or not camera.sees_like(frame.camera, refocused_px)
 
     def _look(
         self, frame: RgbdFrame, seen: RgbdFrame, watch: Stopwatch, *, is_late: bool,
@@ -262,13 +279,13 @@ class BodyTracker:
     def _late_s(self, track: PersonTrack) -> float:
         """Return for how long a person has walked on unseen while the first fit was made [s]."""
         is_late = track.has_just_begun and track.gap_s > LONG_GAP_S
-        return track.gap_s if is_late and not self._gap.is_of_slow_camera else 0.0
+        return track.gap_s if is_late and not self._gap.has_time else 0.0
 
     def _ask(self, scene: Scene, glimpse: Glimpse, number: int | None = None) -> None:
         """Have a detected person fitted from retrieved poses; wait where nobody is known."""
         self._fresh.ask(
             self.pipeline, glimpse.look.scene(scene.taken, number), glimpse.detection, number,
-            wait=self._gap.is_of_slow_camera or not self._tracks)
+            wait=self._gap.has_time or not self._tracks)
 
     def _begin(
         self, scene: Scene, glimpse: Glimpse, watch: Stopwatch

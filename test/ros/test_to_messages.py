@@ -15,7 +15,7 @@ from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.body.skinning import vertices
 from pop_core.estimate import BodyEstimate, FrameResult, JointState
 from pop_core.geometry.camera import Camera
-from pop_core.rgbd import RgbdFrame
+from pop_core.rgbd import RgbdFrame, undistort_mask
 from pop_ros.body_messages import BodyMessages
 from pop_ros.from_messages import decode_color, stamp_ns
 from pop_ros.node_config import MeshConfig, NodeConfig
@@ -209,6 +209,27 @@ def test_the_overlay_comes_with_every_frame_and_shows_the_body(
     assert stamp_ns(outputs['overlay'].header) == STAMP_NS
     changed = np.any(decode_color(outputs['overlay']) != frame.rgb, axis=2)
     assert changed[body(model).mask].mean() > 0.3
+
+
+def test_the_overlay_of_a_distorted_camera_marks_what_its_pinhole_sees(
+    model: BodyModel, frame: RgbdFrame
+) -> None:
+    bent = replace(
+        CAMERA, distortion_model='plumb_bob', d=np.array([-0.4, 0.1, 0.0, 0.0, 0.0]))
+    frame = replace(frame, camera=bent)
+    aside = np.zeros((48, 64), dtype=bool)
+    aside[4:20, 2:14] = True
+    pinhole = undistort_mask(aside, bent)
+    assert (pinhole != aside).sum() > 20  # the test would be empty otherwise
+    drawn = []
+    for mask in (aside, np.zeros_like(aside)):
+        people = result(replace(body(model), mask=mask))
+        (_, picture), = BodyMessages(model, NodeConfig()).build(
+            people, frame, 'optical', ('overlay',))
+        drawn.append(decode_color(picture).astype(int))
+    marked = np.any(drawn[0] != drawn[1], axis=2)
+    middle, seen, own = (np.argwhere(m).mean(axis=0) for m in (marked, pinhole, aside))
+    assert np.linalg.norm(middle - seen) < 0.25 * np.linalg.norm(own - seen)
 
 
 def test_the_overlay_which_takes_longest_holds_up_no_other_message(

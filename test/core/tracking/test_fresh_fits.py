@@ -16,6 +16,7 @@ from pop_core.tracking.detection_schedule import LONG_GAP_S, DetectionSchedule, 
 from pop_core.tracking.finder import FoundPerson
 from pop_core.tracking.fresh_fits import FreshFits
 from pop_core.tracking.track import PersonTrack
+from pop_core.tracking.tracker import CALM_FRAMES
 from pop_core.tracking.tracking_config import TrackingConfig
 
 STEP_M = 0.05
@@ -47,6 +48,21 @@ def test_slow_cameras_leave_time_to_wait(
     stage.stamp_ns += 1_000_000_000
     assert len(stage.show(person, newcomer(person, 0))) == 2
     assert late.asked == 0
+
+
+def test_slow_cameras_that_are_too_fast_for_us_leave_no_time(
+    stage: Stage, late: Late, person: BodyParameters
+) -> None:
+    stage.show(person)
+    stage.stamp_ns += 400_000_000
+    stage.show(person, skipped=1)  # two images in 0.47 s: it was no time to wait
+    stage.stamp_ns += 150_000_000
+    assert only(stage.show(person, newcomer(person, 0))).track.id == 0
+    assert late.asked == 1
+    for _ in range(CALM_FRAMES):
+        stage.stamp_ns += 150_000_000
+        stage.show(person)
+    assert stage.tracker._gap.has_time
 
 
 def test_somebody_new_comes_in_where_they_have_walked_to_meanwhile(

@@ -231,6 +231,7 @@ def test_slow_cameras_leave_time_to_wait_for_a_look(rate_hz: float, patience_s: 
     assert Gap(1.0 / rate_hz).patience_s == pytest.approx(patience_s)
     busy_s = patience_s if patience_s == math.inf else 0.0
     assert Gap(3.0 / rate_hz, skipped=2).patience_s == busy_s
+    assert Gap(1.0 / rate_hz, is_hurried=True).patience_s <= 1.0 / 15.0
 
 
 def test_without_help_every_look_is_waited_for(stage: Stage) -> None:

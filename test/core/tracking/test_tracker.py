@@ -100,6 +100,29 @@ def test_another_camera_begins_anew(stage: Stage, person: BodyParameters) -> Non
     assert [body.track.id for body in bodies] == [1]
 
 
+def test_a_camera_that_moves_by_hundredths_of_a_pixel_is_the_same(
+    stage: Stage, person: BodyParameters
+) -> None:
+    stage.show(person, times=4)
+    for k in range(1, 4):
+        stage.stamp_ns += round(1e9 / RATE_HZ)
+        moved = replace(CAMERA, fx=CAMERA.fx + 0.01 * k, cx=CAMERA.cx - 0.01 * k)
+        frame = replace(stage.frame(person, hidden=False), camera=moved)
+        assert only(list(stage.tracker.process(frame).bodies)).track.id == 0
+    assert stage.tracker._last[0].sees_like(CAMERA)  # what is kept per camera stays
+
+
+def test_a_camera_that_refocuses_sees_the_same_people(
+    stage: Stage, person: BodyParameters
+) -> None:
+    stage.show(person, times=4)
+    stage.stamp_ns += round(1e9 / RATE_HZ)
+    moved = replace(CAMERA, fx=CAMERA.fx * 1.006, fy=CAMERA.fy * 1.006)
+    frame = replace(stage.frame(person, hidden=False), camera=moved)
+    assert only(list(stage.tracker.process(frame).bodies)).track.id == 0
+    assert stage.tracker._last[0].sees_like(moved)
+
+
 def test_a_reset_counts_from_zero(stage: Stage, person: BodyParameters) -> None:
     stage.show(person, times=2)
     stage.tracker.reset()
