@@ -218,9 +218,9 @@ def test_the_overlay_of_a_distorted_camera_marks_what_its_pinhole_sees(
         CAMERA, distortion_model='plumb_bob', d=np.array([-0.4, 0.1, 0.0, 0.0, 0.0]))
     frame = replace(frame, camera=bent)
     aside = np.zeros((48, 64), dtype=bool)
-    aside[4:20, 2:14] = True
+    aside[8:18, 10:18] = True
     pinhole = undistort_mask(aside, bent)
-    assert (pinhole != aside).sum() > 20  # the test would be empty otherwise
+    assert (pinhole != aside).sum() > 30  # the test would be empty otherwise
     drawn = []
     for mask in (aside, np.zeros_like(aside)):
         people = result(replace(body(model), mask=mask))
@@ -229,7 +229,7 @@ def test_the_overlay_of_a_distorted_camera_marks_what_its_pinhole_sees(
         drawn.append(decode_color(picture).astype(int))
     marked = np.any(drawn[0] != drawn[1], axis=2)
     middle, seen, own = (np.argwhere(m).mean(axis=0) for m in (marked, pinhole, aside))
-    assert np.linalg.norm(middle - seen) < 0.25 * np.linalg.norm(own - seen)
+    assert np.linalg.norm(middle - seen) < 0.5 * np.linalg.norm(own - seen)
 
 
 def test_the_overlay_which_takes_longest_holds_up_no_other_message(
