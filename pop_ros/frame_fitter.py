@@ -73,7 +73,7 @@ class FrameFitter:
             self._pipeline, config.tracking, finding, looking, searching)
         self._messages = BodyMessages(self._pipeline.model, config)
         self._maker = FrameMaker(frames or StaticFrames())
-        self._maker.extrinsics = parse_extrinsics(config.depth.extrinsics)
+        self._configure_inputs(config)
 
     @property
     def model(self) -> BodyModel:
@@ -88,7 +88,11 @@ class FrameFitter:
             old.model, old.library, old.detector, pipeline_config, old.fitter.prior)
         self._tracker.configure(self._pipeline, config.tracking)
         self._messages.configure(config)
+        self._configure_inputs(config)
+
+    def _configure_inputs(self, config: NodeConfig) -> None:
         self._maker.extrinsics = parse_extrinsics(config.depth.extrinsics)
+        self._maker.is_rectified = config.input.rectified
 
     def reset(self) -> None:
         """Start the ids of people anew."""

@@ -28,6 +28,7 @@ class FrameMaker:
     def __init__(self, frames: StaticFrames) -> None:
         """Take known transforms from `frames`, which may grow later."""
         self.extrinsics: Float[np.ndarray, '4 4'] | None = None
+        self.is_rectified = False
         self._frames = frames
         self._registration: DepthRegistration | None = None
 
@@ -42,7 +43,7 @@ class FrameMaker:
         """
         color_frame, depth_frame = color.header.frame_id, depth.header.frame_id
         if color_frame == depth_frame:
-            return frame_from_messages(color, depth, info)
+            return frame_from_messages(color, depth, info, is_rectified=self.is_rectified)
         T_color_depth = self.extrinsics
         if T_color_depth is None:
             T_color_depth = self._frames.lookup(color_frame, depth_frame)
@@ -56,7 +57,7 @@ class FrameMaker:
             raise BadMessageError(
                 f'pair: expected depth/camera_info to register depth of frame {depth_frame!r} to '
                 f'color frame {color_frame!r}, found none')
-        color_camera = camera_from_info(info)
+        color_camera = camera_from_info(info, is_rectified=self.is_rectified)
         registration = self._prepared(camera_from_info(depth_info), color_camera, T_color_depth)
         try:
             depth_m = registration.apply(decode_depth(depth))

@@ -88,8 +88,12 @@ def decode_depth(message: Any) -> Float32[np.ndarray, 'h w']:
     return METRES[raw] if kind == 'u2' else clean_depth(raw.astype(np.float32))
 
 
-def camera_from_info(info: Any) -> Camera:
+def camera_from_info(info: Any, *, is_rectified: bool = False) -> Camera:
     """Return the intrinsics of a CameraInfo, of ROS 2 or ROS 1, after its binning and ROI.
+
+    Args:
+        info: The message.
+        is_rectified: Whether its images come with distortion taken out: P holds then.
 
     Raises:
         BadMessageError: If the camera is uncalibrated or its distortion model is unknown.
@@ -100,6 +104,9 @@ def camera_from_info(info: Any) -> Camera:
             'camera_info: expected intrinsics, found K = 0: the camera is uncalibrated '
             '(run camera_calibration, or let the driver publish its factory calibration)')
     model, d = _distortion(info)
+    if is_rectified:
+        P = np.asarray(_field(info, 'p'), dtype=np.float64).reshape(3, 4)
+        K, model, d = P[:, :3].ravel(), '', np.zeros(0)
     bin_x, bin_y = max(1, int(info.binning_x)), max(1, int(info.binning_y))
     roi = info.roi
     width, height = int(roi.width) or int(info.width), int(roi.height) or int(info.height)
@@ -112,13 +119,21 @@ def camera_from_info(info: Any) -> Camera:
         raise BadMessageError(f'camera_info: {error}') from error
 
 
-def frame_from_messages(color: Any, depth: Any, info: Any) -> RgbdFrame:
+def frame_from_messages(
+    color: Any, depth: Any, info: Any, *, is_rectified: bool = False
+) -> RgbdFrame:
     """Return the frame of a pair of registered images and their CameraInfo.
+
+    Args:
+        color: Colour image.
+        depth: Depth image.
+        info: CameraInfo of both.
+        is_rectified: Whether distortion has been taken out of the images.
 
     Raises:
         BadMessageError: If one of the three cannot be read or they do not belong together.
     """
-    camera = camera_from_info(info)
+    camera = camera_from_info(info, is_rectified=is_rectified)
     if depth.header.frame_id != color.header.frame_id:
         raise BadMessageError(
             f'pair: expected depth registered to color frame {color.header.frame_id!r}, found '

@@ -29,6 +29,8 @@ class InputConfig:
 
     reliability: str = setting(
         'auto', about='Reliability asked of publishers: auto (as offered), reliable, best_effort.')
+    rectified: bool = setting(
+        False, about='Images come with distortion taken out (image_rect): P holds, not K and D.')
 
 
 @dataclass(frozen=True, slots=True)

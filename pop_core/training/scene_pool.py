@@ -11,8 +11,7 @@ from torch import Tensor
 from pop_core.training.shards import OWNER_SHIFT, Shard
 from pop_core.training.targets import Batch
 
-SHOWN_PX = 200.0  # scenes with this many pixels of people are drawn twice as often as with few
-EMPTY_WORTH = 2.5  # scenes without anybody teach more than scenes of a hand
+SHOWN_PX = 200.0  # scenes with this many pixels of people are drawn twice as often as empty ones
 
 
 class ScenePool:
@@ -70,4 +69,4 @@ def hidden_share(shard: Shard) -> Float[Tensor, 'n']:
 def worth(shard: Shard) -> Float[Tensor, 'n']:
     """Return how often each scene is drawn: the more it shows of people, the more it teaches."""
     shown = (torch.from_numpy(shard.labels) >= 1 << OWNER_SHIFT).sum(dim=(1, 2))
-    return torch.where(shown == 0, EMPTY_WORTH, 1.0 + (shown / SHOWN_PX).sqrt())
+    return 1.0 + (shown / SHOWN_PX).sqrt()

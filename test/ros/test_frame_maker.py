@@ -1,5 +1,6 @@
 """Depth in a frame of its own is registered with a known transform, and never without one."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,12 +9,15 @@ from geometry_msgs.msg import Transform, TransformStamped
 from scipy.spatial.transform import Rotation
 from support.messages import camera_info, image
 
+from pop_core.config import PipelineConfig
 from pop_core.errors import SettingError
 from pop_core.geometry.camera import Camera
 from pop_core.geometry.transform import invert_transform, make_transform
+from pop_ros.finding_process import Nobody
+from pop_ros.frame_fitter import FrameFitter
 from pop_ros.frame_maker import FrameMaker
 from pop_ros.message_error import BadMessageError
-from pop_ros.node_config import DepthConfig, NodeConfig
+from pop_ros.node_config import DepthConfig, InputConfig, NodeConfig
 from pop_ros.static_frames import StaticFrames, parse_extrinsics
 
 COLOR = Camera(80, 60, 70.0, 70.0, 39.5, 29.5)
@@ -141,3 +145,17 @@ def test_bad_extrinsics_are_refused(text: str) -> None:
 
 def test_no_extrinsics_are_none() -> None:
     assert parse_extrinsics(' ') is None
+
+
+def test_the_node_s_setting_says_whether_images_are_rectified() -> None:
+    bent = replace(COLOR, distortion_model='plumb_bob', d=np.array([0.1, -0.2, 0.0, 0.0, 0.0]))
+    P = np.array([[70.0, 0, 39, 0], [0, 71.0, 29, 0], [0, 0, 1, 0]])
+    color, *_ = messages()
+    depth = image(np.full((60, 80), 2.0, np.float32), '32FC1', 77, frame_id='color')
+    for is_rectified in (True, False):
+        config = NodeConfig(input=InputConfig(rectified=is_rectified))
+        fitter = FrameFitter(Nobody(), PipelineConfig(), NodeConfig())
+        fitter.configure(PipelineConfig(), config)
+        camera = fitter._maker.make(color, depth, camera_info(bent, p=P.ravel())).camera
+        assert camera.is_distorted != is_rectified
+        assert camera.fx == (70.0 if is_rectified else COLOR.fx)

@@ -125,6 +125,18 @@ def test_an_uncalibrated_camera_is_named() -> None:
         camera_from_info(camera_info(CAMERA, k=np.zeros(9)))
 
 
+def test_rectified_images_have_the_intrinsics_of_p_and_no_distortion() -> None:
+    P = np.array([[500.0, 0, 30, 0], [0, 510.0, 20, 0], [0, 0, 1, 0]])
+    info = camera_info(
+        CAMERA, p=P.ravel(), d=np.array([0.1, -0.2, 0.0, 0.0, 0.0]), binning_x=2, binning_y=2)
+    found = camera_from_info(info, is_rectified=True)
+    assert not found.is_distorted
+    assert (found.fx, found.fy, found.cx, found.cy) == (250.0, 255.0, 14.75, 9.75)
+    assert camera_from_info(info).is_distorted
+    with pytest.raises(BadMessageError, match='finite intrinsics'):
+        camera_from_info(camera_info(CAMERA, p=np.zeros(12)), is_rectified=True)
+
+
 def test_a_camera_survives_the_round_trip() -> None:
     d = np.array([0.03, 0.05, -0.001, 0.003, -0.5])
     for camera in (CAMERA, Camera(640, 480, 540.0, 541.0, 320.0, 239.0, 'plumb_bob', d),

@@ -12,7 +12,7 @@ torch = pytest.importorskip('torch')
 from pop_core.body.joints import SHARED_MIRROR  # noqa: E402 - torch first
 from pop_core.keypoints.body_parts import CLASS_MIRROR  # noqa: E402
 from pop_core.training.augmentation import cropped, mirrored, scaled, varied  # noqa: E402
-from pop_core.training.scene_pool import ScenePool, hidden_share, worth  # noqa: E402
+from pop_core.training.scene_pool import ScenePool, hidden_share  # noqa: E402
 from pop_core.training.targets import make_targets  # noqa: E402
 
 
@@ -118,15 +118,6 @@ def test_a_full_pool_forgets_the_oldest(small_scenes):
     wanted = pack([small_scenes[8], small_scenes[11], small_scenes[6]])
     np.testing.assert_array_equal(
         np.rint(kept.depth_m.numpy() * 1e3), wanted.depth_mm.clip(0, 32767))
-
-
-def test_scenes_without_anybody_are_drawn_as_often_as_those_of_half_a_person(small_scenes):
-    shard = pack(small_scenes[:4])
-    shard.labels[:] = 0
-    shard.labels[1, 0, 0], shard.labels[2, :20, :20], shard.labels[3] = 16, 16, 16
-    empty, hand, half, all_of_it = worth(shard)
-    assert hand < empty < all_of_it
-    assert abs(empty - half) < 0.2
 
 
 def test_the_curriculum_begins_with_people_in_plain_view(small_scenes):
