@@ -105,7 +105,8 @@ class BodyTracker:
         frame = self._of_known_camera(frame)
         if self._is_another_recording(frame):
             self._forget()
-        self._in_time = 0 if skipped else self._in_time + 1
+        # What was left out before the first one was no lack of time.
+        self._in_time = 0 if skipped and self._last is not None else self._in_time + 1
         self._gap = Gap(
             np.inf if self._last is None else (frame.stamp_ns - self._last[1]) * 1e-9, skipped,
             is_hurried=self._in_time < CALM_FRAMES)
