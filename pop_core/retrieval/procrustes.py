@@ -117,7 +117,9 @@ def rank_similarities(
     m = columns.shape[2]
     out = np.empty(m, dtype=np.float32)
     parts = threads if m > SMALL else 1
-    edges = np.linspace(0, m, parts + 1).astype(int)
+    # Parts of whole blocks: what is left over of one may be rounded otherwise.
+    edges = np.linspace(0, m, parts + 1).astype(int) // kernels.BLOCK * kernels.BLOCK
+    edges[-1] = m
 
     def fill(part: int) -> None:
         kernels.similarity_costs(columns, *arguments, out, edges[part], edges[part + 1])
