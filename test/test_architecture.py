@@ -19,9 +19,9 @@ LAYERS = (
     ('pop_core.rendering', 'pop_core.keypoints'),
     ('pop_core.estimate',),
     ('pop_core.body',),
-    ('pop_core.rgbd',),
+    ('pop_core.rgbd', 'pop_core.depth_noise'),
     ('pop_core.geometry',),
-    ('pop_core.settings', 'pop_core.stopwatch', 'pop_core.depth_noise'),
+    ('pop_core.settings', 'pop_core.stopwatch'),
     ('pop_core.errors',),
 )
 LINE = {part: number for number, parts in enumerate(LAYERS) for part in parts}
