@@ -77,18 +77,14 @@ def undistort_mask(
     mask: Bool[np.ndarray, 'h w'], camera: Camera
 ) -> Bool[np.ndarray, 'h w']:
     """Return a mask of the camera's image in the pixels of its pinhole."""
-    if not camera.is_distorted:
-        return mask
-    return lens_maps(camera).of_pinhole.nearest(mask.view(np.uint8), 0.0).view(bool)
+    return lens_maps(camera).of_pinhole.mask(mask) if camera.is_distorted else mask
 
 
 def distort_mask(
     mask: Bool[np.ndarray, 'h w'], camera: Camera
 ) -> Bool[np.ndarray, 'h w']:
     """Return a mask of the pinhole image in the pixels of the camera's own image."""
-    if not camera.is_distorted:
-        return mask
-    return lens_maps(camera).of_camera.nearest(mask.view(np.uint8), 0.0).view(bool)
+    return lens_maps(camera).of_camera.mask(mask) if camera.is_distorted else mask
 
 
 def point_cloud(

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import cv2
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Bool, Float32
 
 from pop_core.geometry.camera import Camera
 
@@ -36,6 +36,10 @@ class PixelMap:
         return cv2.remap(  # type: ignore[return-value]
             image, self.u, self.v, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT,
             borderValue=border)
+
+    def mask(self, mask: Bool[np.ndarray, 'h w']) -> Bool[np.ndarray, 'h w']:
+        """Return a mask of the other image in the pixels of this one; false beyond the other."""
+        return self.nearest(mask.view(np.uint8), 0.0).view(bool)
 
     def interpolated(self, image: ImageT) -> ImageT:
         """Return an image of any channels, interpolated, black beyond the other."""

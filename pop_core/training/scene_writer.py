@@ -85,10 +85,11 @@ def write_shards(
     """
     jobs = [(folder / f'{seed:04d}_{k:05d}.npz', seed * 100_000 + k, kind)
             for k in range(-(-count // SHARD_SCENES))]
-    todo = [job for job in jobs if not job[0].exists()]
-    if len(todo) < len(jobs):
-        load_fitting(next(path for path, *_ in jobs if path.exists()), kind.size)
-    done = (len(jobs) - len(todo)) * SHARD_SCENES
+    kept = {path for path, *_ in jobs if path.exists()}
+    if kept:
+        load_fitting(min(kept), kind.size)
+    todo = [job for job in jobs if job[0] not in kept]
+    done = len(kept) * SHARD_SCENES
     if workers == 1:
         for job in todo:
             _write(job)
