@@ -24,7 +24,7 @@ def _seen(vertices, fx, fy, cx, cy):
 
 
 @njit(cache=True, nogil=True, inline='always')  # a call with six arrays costs as much as it draws
-def _draw(t, a, b, c, u, v, inverse, closed, nearest, face_id):
+def draw_triangle(t, a, b, c, u, v, inverse, closed, nearest, face_id):
     """Draw triangle t of vertices a, b, c into inverse depth, 0 = nothing; see `rasterize`."""
     h, w = nearest.shape
     if inverse[a] == 0.0 or inverse[b] == 0.0 or inverse[c] == 0.0:
@@ -61,7 +61,7 @@ def _draw(t, a, b, c, u, v, inverse, closed, nearest, face_id):
 
 
 @njit(cache=True, nogil=True, error_model='numpy')
-def _invert(image):
+def invert_depth(image):
     """Turn inverse depth (h,w) into depth: what is 0 becomes +inf."""
     for y in range(image.shape[0]):
         for x in range(image.shape[1]):
@@ -77,8 +77,9 @@ def rasterize(vertices, faces, fx, fy, cx, cy, closed, depth, face_id):
     """
     u, v, inverse = _seen(vertices, fx, fy, cx, cy)
     for t in range(faces.shape[0]):
-        _draw(t, faces[t, 0], faces[t, 1], faces[t, 2], u, v, inverse, closed, depth, face_id)
-    _invert(depth)
+        draw_triangle(
+            t, faces[t, 0], faces[t, 1], faces[t, 2], u, v, inverse, closed, depth, face_id)
+    invert_depth(depth)
 
 
 @njit(cache=True, nogil=True)
@@ -87,10 +88,11 @@ def rasterize_parts(vertices, faces, part, fx, fy, cx, cy, closed, depth):
     u, v, inverse = _seen(vertices, fx, fy, cx, cy)
     face_id = np.empty(depth.shape[1:], dtype=np.int32)
     for t in range(faces.shape[0]):
-        _draw(t, faces[t, 0], faces[t, 1], faces[t, 2], u, v, inverse, closed, depth[part[t]],
-              face_id)
+        draw_triangle(
+            t, faces[t, 0], faces[t, 1], faces[t, 2], u, v, inverse, closed, depth[part[t]],
+            face_id)
     for k in range(depth.shape[0]):
-        _invert(depth[k])
+        invert_depth(depth[k])
 
 
 @njit(cache=True, nogil=True)
@@ -111,7 +113,7 @@ def rasterize_alike(vertices, faces, fx, fy, cx, cy, closed, depth):
     for t in range(faces.shape[0]):
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         if not (differs[a] or differs[b] or differs[c]):
-            _draw(t, a, b, c, u, v, inverse, closed, depth[0], face_id)
+            draw_triangle(t, a, b, c, u, v, inverse, closed, depth[0], face_id)
     for m in range(1, k):
         depth[m] = depth[0]
     for m in range(k):
@@ -119,8 +121,8 @@ def rasterize_alike(vertices, faces, fx, fy, cx, cy, closed, depth):
         for t in range(faces.shape[0]):
             a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
             if differs[a] or differs[b] or differs[c]:
-                _draw(t, a, b, c, u, v, inverse, closed, depth[m], face_id)
-        _invert(depth[m])
+                draw_triangle(t, a, b, c, u, v, inverse, closed, depth[m], face_id)
+        invert_depth(depth[m])
 
 
 @njit(cache=True, nogil=True)

@@ -12,7 +12,6 @@ from jaxtyping import Bool, Float, Float32, Int
 from pop_core.errors import FrameError
 from pop_core.geometry.camera import Camera
 from pop_core.rendering import registration_kernels
-from pop_core.rendering.depth_renderer import render_depth
 
 JUMP_RATIO = 0.03  # neighbours farther apart than this share of their depth are two surfaces
 
@@ -32,9 +31,11 @@ class DepthRegistration:
         """
         self.depth_camera, self.color_camera = depth_camera, color_camera
         self.T_color_depth = T_color_depth
-        rays = depth_camera.ray_grid().reshape(-1, 2)
+        self._offset = np.ascontiguousarray(T_color_depth[:3, 3])
+        grid = depth_camera.ray_grid()
+        rays = np.concatenate([grid, np.ones_like(grid[..., :1])], axis=-1)
         # Turned once, rays need no rotation per frame.
-        self._rays_color = np.column_stack([rays, np.ones(len(rays))]) @ T_color_depth[:3, :3].T
+        self._rays_color = np.ascontiguousarray(rays @ T_color_depth[:3, :3].T)
         self._places = _distorted_places(color_camera)
 
     def apply(self, depth_m: Float32[np.ndarray, 'h w']) -> Float32[np.ndarray, 'H W']:
@@ -48,28 +49,17 @@ class DepthRegistration:
             raise FrameError(
                 f'depth: expected {camera.width}x{camera.height} as its camera says, found '
                 f'{depth_m.shape[1]}x{depth_m.shape[0]}')
-        faces = surface_faces(depth_m)
-        if not len(faces):
-            size = (self.color_camera.height, self.color_camera.width)
-            return np.full(size, np.nan, dtype=np.float32)
-        known = np.where(np.isfinite(depth_m), depth_m, 0.0).reshape(-1, 1)
-        p_color = self._rays_color * known + self.T_color_depth[:3, 3]
-        drawn = render_depth(p_color, faces, self.color_camera.without_distortion())
-        registered = np.where(drawn.covered, drawn.depth_m, np.float32(np.nan))
+        target = self.color_camera
+        drawn = np.zeros((target.height, target.width), dtype=np.float32)
+        registration_kernels.draw_measured_surface(
+            np.ascontiguousarray(depth_m), self._rays_color, self._offset, JUMP_RATIO,
+            target.fx, target.fy, target.cx, target.cy, drawn,
+            np.empty(drawn.shape, dtype=np.int32))
+        registered = np.where(np.isfinite(drawn), drawn, np.float32(np.nan))
         if self._places is None:
             return registered
         u, v, inside = self._places
         return np.where(inside, registered[v, u], np.float32(np.nan))
-
-
-def surface_faces(
-    depth_m: Float32[np.ndarray, 'h w'], jump_ratio: float = JUMP_RATIO
-) -> Int[np.ndarray, 'm 3']:
-    """Return two triangles (indices of pixels in row order) per square of four near neighbours."""
-    h, w = depth_m.shape
-    faces = np.empty((2 * (h - 1) * (w - 1), 3), dtype=np.int64)
-    count = registration_kernels.fill_faces(np.ascontiguousarray(depth_m), jump_ratio, faces)
-    return faces[:count]
 
 
 def _distorted_places(

@@ -7,7 +7,7 @@ from pop_core.errors import FrameError
 from pop_core.geometry.camera import Camera
 from pop_core.geometry.rotation import from_rotvec
 from pop_core.geometry.transform import make_transform
-from pop_core.rendering.depth_registration import DepthRegistration, surface_faces
+from pop_core.rendering.depth_registration import DepthRegistration
 
 DEPTH_CAMERA = Camera(160, 120, 140.0, 142.0, 80.5, 58.5)
 COLOR_CAMERA = Camera(320, 240, 250.0, 251.0, 158.0, 121.0)
@@ -65,8 +65,13 @@ def test_holes_and_jumps_carry_no_surface() -> None:
     depth_m = np.full((6, 7), 2.0, np.float32)
     depth_m[2, 3] = np.nan
     depth_m[:, 5:] = 4.0
-    squares = 5 * 6 - 4 - 5  # those around the hole, those across the jump
-    assert len(surface_faces(depth_m)) == 2 * squares
+    coarse = Camera(7, 6, 8.0, 8.0, 3.0, 2.5)
+    fine = Camera(25, 21, 32.0, 32.0, 12.0, 10.0)  # four of its pixels to one, centres on centres
+    found = DepthRegistration(coarse, fine, np.eye(4)).apply(depth_m)
+    assert np.isnan(found[5:12, 9:16]).all()  # inside the four squares around the hole
+    assert np.isnan(found[:, 17:20]).all()  # across the jump
+    np.testing.assert_allclose(found[1:4, 1:16], 2.0, rtol=1e-6)
+    np.testing.assert_allclose(found[1:-1, 21:24], 4.0, rtol=1e-6)
 
 
 def test_an_image_without_depth_gives_none() -> None:
