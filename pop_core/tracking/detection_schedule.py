@@ -1,4 +1,7 @@
-"""When to look for people: rarely while all are followed well, often while somebody is not."""
+"""When to look for people: rarely while all are followed well, often while somebody is not.
+
+Where nobody was seen, rarely too: an empty room leaves a robot its processor.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,7 @@ BLURRED_M, MOVING_M = 0.028, 0.05
 MOST_TRIES = 3  # whom looks go on contradicting is no news any more
 SOON = 2  # frames from one look to the next while somebody is not followed well
 # Frames are counted as of such a camera: at a lower rate people move farther from one to the next.
+# Those without a clock, all of one stamp, count as such too.
 RATE_HZ = 30.0
 # A camera that is slower leaves time to wait for a look, for this share of what lies between two
 # of its frames: whoever is followed is drawn to where their limbs are, not to where they were.
@@ -77,7 +81,7 @@ class DetectionSchedule:
     def __init__(self, config: TrackingConfig) -> None:
         """Ask at the first frame."""
         self._config = config
-        self._frames_since, self._since_s = config.detect_every, 0.0
+        self._frames_since, self._since_s = config.detect_every, config.detect_every / RATE_HZ
 
     @property
     def has_looked(self) -> bool:
@@ -86,7 +90,7 @@ class DetectionSchedule:
 
     def is_due(
         self, tracks: Sequence[PersonTrack], gap: Gap, *, is_busy: bool = False,
-        is_late: bool = False, is_looking: bool = False,
+        is_late: bool = False, is_looking: bool = False, is_empty: bool = False,
     ) -> bool:
         """Return whether to look for people in this frame; if so, it counts as done.
 
@@ -96,9 +100,10 @@ class DetectionSchedule:
             is_busy: Whether somebody is being fitted, so that nobody else can begin.
             is_late: Whether a body comes in that was fitted to a frame of some time ago.
             is_looking: Whether a look at an earlier frame is still being made.
+            is_empty: Whether the last look saw nobody.
         """
         self._frames_since += 1
-        self._since_s += gap.of_camera_s
+        self._since_s += gap.of_camera_s or 1.0 / RATE_HZ
         if is_looking or (not tracks and is_busy and not is_late):
             return False
         every = self._config.detect_every
@@ -108,8 +113,9 @@ class DetectionSchedule:
             every = 1
         # A look of our own that took long is no reason for the next.
         after_gap = gap.is_long and (gap.is_of_slow_camera or self._frames_since > 1)
-        frames = max(self._frames_since, round(min(self._since_s, LONGEST_S) * RATE_HZ))
-        if tracks and not (is_late or after_gap) and frames < every:
+        frames = round(min(self._since_s, LONGEST_S) * RATE_HZ)
+        is_calm = bool(tracks) or is_empty
+        if is_calm and not (is_late or after_gap) and frames < every:
             return False
         self._frames_since, self._since_s = 0, 0.0
         return True

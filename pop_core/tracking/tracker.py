@@ -74,6 +74,7 @@ class BodyTracker:
         self._ground: Ground | None = None
         self._noise = USUAL_NOISE
         self._refused: EstimateStatus | None = None
+        self._is_empty = False  # whether the last look saw nobody
         self.configure(pipeline, config or TrackingConfig())
 
     def configure(self, pipeline: BodyPipeline, config: TrackingConfig) -> None:
@@ -138,6 +139,7 @@ class BodyTracker:
         self._looks.forget()
         self._late_limbs.forget_unless(())
         self._refused = None
+        self._is_empty = False
         self._last, self._ground = None, None
         self._schedule = DetectionSchedule(self.config)
 
@@ -175,7 +177,8 @@ class BodyTracker:
         patience_s = np.inf if is_needed else self._gap.patience_s
         if self._schedule.is_due(
                 self._tracks, self._gap, is_busy=self._fresh.is_busy, is_late=is_late,
-                is_looking=self._looks.is_busy and patience_s < np.inf):
+                is_looking=self._looks.is_busy and patience_s < np.inf,
+                is_empty=self._is_empty):
             look = self._looks.look(self.pipeline, frame, seen, patience_s=patience_s) or look
         if look is None and self._looks.is_busy:
             # A body found anew is compared by keypoints too.
@@ -183,6 +186,7 @@ class BodyTracker:
         if look is not None:
             watch.add(look.seen.times_ms)
             self._ground, self._noise = look.seen.ground, look.seen.noise
+            self._is_empty = not look.found.detections
         return look
 
     def _places(self) -> dict[int, Expected]:

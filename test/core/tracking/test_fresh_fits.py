@@ -251,14 +251,37 @@ def test_a_long_look_is_no_reason_for_the_next_one(tracks: list[PersonTrack]) ->
     assert [schedule.is_due(tracks, QUICK) for _ in range(4)] == [False, False, True, False]
 
 
-def test_cameras_of_less_than_30_hz_are_looked_at_as_often_in_time(
+def test_cameras_of_other_rates_are_looked_at_as_often_in_time(
     tracks: list[PersonTrack]
 ) -> None:
-    for rate_hz, looks in ((30.0, 20), (15.0, 15), (10.0, 20)):
+    for rate_hz, looks in ((60.0, 20), (30.0, 20), (15.0, 15), (10.0, 20)):
         schedule = DetectionSchedule(TrackingConfig(detect_every=3))
         frames = round(2 * rate_hz)
         asked = sum(schedule.is_due(tracks, Gap(1 / rate_hz)) for _ in range(frames))
         assert asked == pytest.approx(looks, abs=1)
+
+
+def test_frames_without_a_clock_count_as_those_of_a_usual_camera(
+    tracks: list[PersonTrack]
+) -> None:
+    schedule = DetectionSchedule(TrackingConfig(detect_every=3))
+    assert [schedule.is_due(tracks, Gap(0.0)) for _ in range(4)] == [True, False, False, True]
+
+
+def test_where_nobody_was_seen_looks_are_as_rare_as_while_all_are_followed_well() -> None:
+    schedule = DetectionSchedule(TrackingConfig(detect_every=3))
+    asked = [schedule.is_due([], QUICK, is_empty=True) for _ in range(4)]
+    assert asked == [True, False, False, True]
+    assert schedule.is_due([], QUICK)  # somebody was seen, though not fitted yet
+
+
+def test_an_empty_room_is_looked_at_now_and_then_and_who_comes_in_is_found(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    stage = Stage(body)
+    stage.show(times=3)  # at 15 Hz every second frame is looked at
+    assert stage.source.asked == 2
+    assert [len(stage.show(person)) for _ in range(2)] == [0, 1]
 
 
 def test_a_node_that_was_slow_once_does_not_stay_slow(
