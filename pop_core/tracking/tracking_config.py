@@ -15,8 +15,8 @@ class TrackingConfig:
         True, about='Whether people are followed over time; else each frame stands alone.')
     detect_every: int = setting(
         3, minimum=1, maximum=1000,
-        about='Frames from one look for people to the next while all are followed well or nobody is '
-        'there, at 30 Hz; as much time at other rates.')
+        about='Frames from one look for people to the next while all are followed well, or nobody '
+        'is there, at 30 Hz; as much time at other rates.')
     steps: int = setting(
         2, minimum=1, maximum=20,
         about='Steps of the fit from the predicted body.')
