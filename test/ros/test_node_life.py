@@ -218,7 +218,10 @@ def stopped(main: str, number: signal.Signals, delay_s: float) -> tuple[int, str
     assert process.stdout.readline() == 'up\n'
     time.sleep(delay_s)
     process.send_signal(number)
-    _, errors = process.communicate(timeout=30)
+    try:
+        _, errors = process.communicate(timeout=30)
+    finally:
+        process.kill()  # a node that goes on would answer the tests that follow
     return process.returncode, errors
 
 
