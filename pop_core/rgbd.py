@@ -25,7 +25,8 @@ class RgbdFrame:
         stamp_ns: Time of the colour image [ns].
 
     Raises:
-        FrameError: If sizes differ or any depth is not NaN and not positive and finite.
+        FrameError: If colour is no RGB of bytes, depth no float32, sizes differ, or any depth is
+            not NaN and not positive and finite.
     """
 
     rgb: UInt8[np.ndarray, 'h w 3']
@@ -35,6 +36,14 @@ class RgbdFrame:
 
     def __post_init__(self) -> None:
         size = (self.camera.height, self.camera.width)
+        if self.rgb.dtype != np.uint8 or self.rgb.shape[2:] != (3,):
+            raise FrameError(
+                f'frame: expected colour as uint8 of (height, width, 3) in RGB order, found '
+                f'{self.rgb.dtype} of {self.rgb.shape}: cv2.cvtColor converts')
+        if self.depth_m.dtype != np.float32:
+            raise FrameError(
+                f'frame: expected depth in metres as float32, found {self.depth_m.dtype}: divide '
+                'integers by their scale (1000 for millimetres), then .astype(np.float32)')
         if self.rgb.shape[:2] != size or self.depth_m.shape != size:
             raise FrameError(
                 f'frame: expected colour and depth of {size[1]}x{size[0]} as the camera says, '

@@ -27,7 +27,7 @@ class FrameKeypoints:
         Raises:
             PopError: If a named source does not exist or fits no decoder.
         """
-        self._file = _FolderFile(or_depth=source is None)
+        self._file = _FolderFile(config, or_depth=source is None)
         self._source: KeypointDetector = self._file
         if source is not None:
             self._source = make_detector(source, decoder=decoder, json_source=self._file)
@@ -56,9 +56,9 @@ class FrameKeypoints:
 class _FolderFile:
     """People of the file that lies beside a frame; of its depth, if allowed, where none does."""
 
-    def __init__(self, *, or_depth: bool) -> None:
+    def __init__(self, config: PipelineConfig | None, *, or_depth: bool) -> None:
         self.folder: FrameFolder | None = None
-        self._or_depth = or_depth
+        self._config, self._or_depth = config, or_depth
         self._depth: KeypointDetector | None = None
 
     def detect(self, frame: RgbdFrame) -> list[Detection]:
@@ -76,4 +76,6 @@ class _FolderFile:
                 self._depth = make_detector('depth')
             except SourceError as error:
                 raise SourceError(f'{self.folder.path}: no keypoints.json; {error}') from None
+            if self._config is not None:
+                apply_settings(self._depth, self._config)
         return self._depth.detect(frame)

@@ -36,8 +36,9 @@ def list_networks() -> None:
     Their weights belong to their publishers: mind the licence.
     """
     table = Table(box=None)
-    for title in ('name', 'size', 'licence', 'read as', 'here', 'what it is'):
-        table.add_column(title)
+    table.add_column('name', no_wrap=True)  # to be typed after `fetch`
+    for title in ('size', 'licence', 'read as', 'here', 'what it is'):
+        table.add_column(title, overflow='fold')
     for entry in load_registry():
         size = '?' if entry.size is None else f'{entry.size / 1e6:.0f} MB'
         table.add_row(

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pop_ros.keypoint_sources import SOURCES, SourceError, make_detector
+from pop_ros.keypoint_sources import SOURCES, SourceError, apply_settings, make_detector
 
 if TYPE_CHECKING:
     from pop_core.config import PipelineConfig
@@ -29,7 +29,7 @@ def make_pipeline(
 
     Args:
         detector: Keypoint source.
-        config: Settings; None takes the defaults.
+        config: Settings, of the source too; None takes the defaults.
         body_file: Body model (.npz) in place of the default body.
         library_file: Pose library in place of the default one.
         progress: Called with a share 0..1 and a sentence while a first library is generated, and
@@ -54,6 +54,8 @@ def make_pipeline(
         library = on_body(library, model)
     if progress is not None and (missing := look_at_kernels().missing):
         progress(0.0, f'compiling kernels of {len(missing)} modules: about a minute, once')
+    if config is not None:
+        apply_settings(detector, config)
     pipeline = BodyPipeline(model, library, detector, config)
     warm_up(pipeline)
     return pipeline

@@ -8,7 +8,8 @@ from pop_core.fitting.body_fit import BodyFit
 from pop_core.keypoints.lifted_joints import LiftedJoints
 
 AGREES_M = 0.15  # of a lifted joint that the fit explains
-COMMON_BETAS = 3.0  # norm of the shape coefficients of nearly everyone, once fitted
+# Norm of the first shape coefficients of nearly everyone, once fitted; further ones are noise.
+COMMON_BETAS, FIRST_BETAS = 3.0, 10
 
 
 def plausibility(fit: BodyFit, lifted: LiftedJoints) -> float:
@@ -23,5 +24,5 @@ def plausibility(fit: BodyFit, lifted: LiftedJoints) -> float:
     off_m = np.linalg.norm(fit.coarse.landmarks - lifted.positions_camera, axis=1)[rows]
     weight = lifted.scores[rows]
     explained = float(weight @ (off_m < AGREES_M) / max(float(weight.sum()), 1e-9))
-    strange = max(0.0, float(np.linalg.norm(fit.parameters.betas)) - COMMON_BETAS)
+    strange = max(0.0, float(np.linalg.norm(fit.parameters.betas[:FIRST_BETAS])) - COMMON_BETAS)
     return explained * float(np.exp(-0.5 * strange**2))

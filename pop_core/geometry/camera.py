@@ -57,6 +57,8 @@ class Camera:
     d: Float[np.ndarray, 'd'] = field(default_factory=_no_distortion)
 
     def __post_init__(self) -> None:
+        # OpenCV calibrates into a matrix of one row.
+        object.__setattr__(self, 'd', np.asarray(self.d, dtype=np.float64).ravel())
         numbers = np.array([self.fx, self.fy, self.cx, self.cy])
         low, high = FOCAL_PX
         if not (np.isfinite(numbers).all() and low <= min(numbers[:2]) and max(numbers) <= high):

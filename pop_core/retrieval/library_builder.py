@@ -30,6 +30,7 @@ from pop_core.retrieval.pruning import PoseThinner
 PATTERNS = {'surreal': '*_info.mat', 'amass': '*.npz', 'npz': '*.npz', 'bvh': '*.bvh'}
 NOT_MOTION = ('shape.npz', 'neutral_stagei.npz')  # shape files that AMASS puts beside motion
 SAMPLE_POSES = 20_000
+MOST_NAMED = 5  # files, where none can be read
 
 Progress = Callable[[int, int], None]
 Shard = dict[str, np.ndarray]
@@ -165,12 +166,20 @@ def build_from_files(
             progress(done, len(sources))
     present = [shard for shard in shards if shard.exists()]
     if not present:
-        raise LibraryFileError(f'{out}: expected poses, found none in {len(sources)} files')
+        folder.rmdir()
+        raise LibraryFileError(_nothing_found(out, len(sources), sorted(failures)))
     read, kept = join_shards(out, present, options)
     for shard in folder.iterdir():
         shard.unlink()
     folder.rmdir()
     return BuildReport(len(sources), tuple(sorted(failures)), read, kept)
+
+
+def _nothing_found(out: Path, n_files: int, failures: Sequence[str]) -> str:
+    lines = [f'{out}: expected poses, found none in {n_files} files', *failures[:MOST_NAMED]]
+    if len(failures) > MOST_NAMED:
+        lines.append(f'and {len(failures) - MOST_NAMED} more')
+    return '\n  '.join(lines)
 
 
 def join_shards(out: Path, shards: Sequence[Path], options: BuildOptions) -> tuple[int, int]:

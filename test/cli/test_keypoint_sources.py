@@ -7,13 +7,17 @@ import pytest
 from cli.conftest import write_frame
 from support.onnx_files import save_network
 
+from pop_core.config import PipelineConfig
 from pop_core.errors import NetworkShapeError
+from pop_core.geometry.camera import Camera
 from pop_core.keypoints.depth_net import load_depth_net
 from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.keypoints.fusion import FusedDetector
 from pop_core.keypoints.onnx_detector import OnnxKeypointDetector
+from pop_core.rgbd import RgbdFrame
+from pop_core.settings import apply_settings
 from pop_ros.fit_keypoints import FrameKeypoints
-from pop_ros.frame_folder import FrameFolder
+from pop_ros.frame_folder import FrameFolder, load_frame
 from pop_ros.keypoint_sources import SourceError, make_detector, reasons, split_sources
 from pop_ros.node_arguments import parse_arguments
 
@@ -148,3 +152,15 @@ def test_a_frame_without_a_file_is_left_to_the_embedded_network(scene, tmp_path)
     found, expected = source.detect(frame), load_depth_net().detect(frame)
     assert len(found) == len(expected) > 0
     np.testing.assert_array_equal(found[0].keypoints_px, expected[0].keypoints_px)
+
+
+def test_settings_reach_the_embedded_network_that_nobody_named(tmp_path):
+    seen = RgbdFrame(
+        np.zeros((60, 80, 3), np.uint8), np.full((60, 80), 2.0, np.float32),
+        Camera(80, 60, 65.0, 65.0, 39.5, 29.5))
+    folder = write_frame(tmp_path / 'frame', seen, None)
+    config = apply_settings(PipelineConfig(), {'depth_net.min_person_score': 0.9})
+    keypoints = FrameKeypoints(None, None, config)
+    keypoints.choose(FrameFolder(folder, Path('frame')))
+    assert keypoints.detect(load_frame(folder)) == []
+    assert keypoints._file._depth.config == config.depth_net

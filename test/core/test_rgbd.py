@@ -11,6 +11,14 @@ CAMERA = Camera(8, 6, 10.0, 10.0, 3.5, 2.5)
 RGB = np.zeros((6, 8, 3), dtype=np.uint8)
 
 
+def unchecked(rgb: np.ndarray, depth_m: np.ndarray) -> None:
+    """Check a frame as users have it, without the types that tests are checked with."""
+    frame = object.__new__(RgbdFrame)
+    for name, value in {'rgb': rgb, 'depth_m': depth_m, 'camera': CAMERA}.items():
+        object.__setattr__(frame, name, value)
+    frame.__post_init__()
+
+
 def depth_with(value: float) -> np.ndarray:
     depth_m = np.full((6, 8), 2.0, dtype=np.float32)
     depth_m[2, 3] = value
@@ -28,6 +36,19 @@ def test_what_is_no_distance_is_told_with_what_to_do(value: float) -> None:
         RgbdFrame(RGB, depth_with(value), CAMERA)
     cleaned = RgbdFrame(RGB, clean_depth(depth_with(value)), CAMERA)
     assert np.isnan(cleaned.depth_m[2, 3])
+
+
+@pytest.mark.parametrize('kind', [np.float64, np.uint16])
+def test_depth_of_another_type_is_told_with_what_to_do(kind: type) -> None:
+    with pytest.raises(FrameError, match=r'expected depth in metres as float32, found.*1000'):
+        unchecked(RGB, depth_with(2.0).astype(kind))
+
+
+@pytest.mark.parametrize('rgb', [
+    RGB[..., 0], np.dstack([RGB, RGB[..., :1]]), RGB.astype(np.float32)])
+def test_colour_of_another_kind_is_told_with_what_to_do(rgb: np.ndarray) -> None:
+    with pytest.raises(FrameError, match=r'expected colour as uint8 .*found .*cv2.cvtColor'):
+        unchecked(rgb, depth_with(2.0))
 
 
 def test_pixels_without_a_measurement_are_fine() -> None:

@@ -1,5 +1,7 @@
 """A fit that begins rolled, crossed or back to front ends right."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.one_person import CAMERA, lift_truth, photograph
@@ -153,6 +155,9 @@ def test_somebody_whose_back_was_taken_for_the_front_is_turned_about(
     assert result.sides_exchanged
     assert errors(body, result.parameters, strider).mean() < 0.03
     assert plausibility(result, lifted) > 0.9  # keypoints agree, but for their names
+    parameters = result.parameters
+    finer = parameters.replaced(betas=np.concatenate([parameters.betas, np.full(40, 1.0)]))
+    assert plausibility(replace(result, parameters=finer), lifted) > 0.9  # of a finer body model
 
 
 def test_exchanging_sides_twice_changes_nothing(

@@ -50,6 +50,13 @@ def test_unknown_or_incomplete_distortion_is_refused(model: str, d: list[float])
         Camera(640, 480, 525.0, 525.0, 320.0, 240.0, model, np.array(d))
 
 
+def test_coefficients_as_opencv_calibrates_them_are_one_row() -> None:
+    camera = Camera(640, 480, 525.0, 525.0, 320.0, 240.0, 'plumb_bob', np.zeros(5))
+    object.__setattr__(camera, 'd', np.full((1, 5), 0.1))  # tests are checked for their types
+    camera.__post_init__()
+    assert camera.d.shape == (5,)
+
+
 def test_zero_focal_length_is_named_as_uncalibrated() -> None:
     with pytest.raises(CameraError, match='calibrated'):
         Camera(640, 480, 0.0, 0.0, 0.0, 0.0)

@@ -142,8 +142,10 @@ def test_a_folder_without_files_is_refused(tmp_path):
 def test_files_without_any_pose_are_refused(tmp_path):
     (tmp_path / 'bad.npz').write_bytes(b'')
     sources = find_sources('npz', tmp_path)
-    with pytest.raises(LibraryFileError, match='expected poses, found none in 1 files'):
+    named = r'expected poses, found none in 1 files\n.*bad.npz'
+    with pytest.raises(LibraryFileError, match=named):
         build_from_files(tmp_path / 'out.poplib', sources, ALL, MODEL, runner=run_here)
+    assert [path.name for path in tmp_path.iterdir()] == ['bad.npz']
 
 
 def test_ray_builds_the_same_library(folder):
