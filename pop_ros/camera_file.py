@@ -1,4 +1,4 @@
-"""Read `camera.json`: `width height fx fy cx cy`, optional `distortion_model` and `d`."""
+"""Read `camera.json`: `width height fx fy cx cy`, perhaps `distortion_model d quarter_turns`."""
 
 from __future__ import annotations
 
@@ -32,8 +32,9 @@ def load_camera(path: Path) -> Camera:
     if not isinstance(coefficients, list):
         raise FrameError(f'{path}: expected d as a list of numbers, found {coefficients!r}')
     d = np.array([_number(value, 'd', path) for value in coefficients], dtype=np.float64)
+    turns = _integer({'quarter_turns': 0} | content, 'quarter_turns', path)
     try:
-        return Camera(width, height, fx, fy, cx, cy, model if d.size else '', d)
+        return Camera(width, height, fx, fy, cx, cy, model if d.size else '', d, turns)
     except CameraError as error:
         raise FrameError(f'{path}: {error}') from None
 
@@ -44,6 +45,8 @@ def camera_json(camera: Camera) -> dict[str, Any]:
     content.update({name: float(getattr(camera, name)) for name in INTRINSICS})
     if camera.d.size:
         content.update(distortion_model=camera.distortion_model, d=camera.d.tolist())
+    if camera.quarter_turns:
+        content['quarter_turns'] = camera.quarter_turns
     return content
 
 

@@ -93,6 +93,7 @@ class FrameFitter:
     def _configure_inputs(self, config: NodeConfig) -> None:
         self._maker.extrinsics = parse_extrinsics(config.depth.extrinsics)
         self._maker.is_rectified = config.input.rectified
+        self._maker.quarter_turns = config.input.quarter_turns
 
     def reset(self) -> None:
         """Start the ids of people anew."""

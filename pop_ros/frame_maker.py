@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -29,11 +30,12 @@ class FrameMaker:
         """Take known transforms from `frames`, which may grow later."""
         self.extrinsics: Float[np.ndarray, '4 4'] | None = None
         self.is_rectified = False
+        self.quarter_turns = 0
         self._frames = frames
         self._registration: DepthRegistration | None = None
 
     def make(self, color: Any, depth: Any, info: Any, depth_info: Any = None) -> RgbdFrame:
-        """Return the frame of a pair of images.
+        """Return the frame of a pair of images, its camera told how it is mounted.
 
         Depth whose frame is that of colour is taken as registered. Any other depth is registered
         with `depth_info` and the transform given or known, and refused without them.
@@ -41,6 +43,10 @@ class FrameMaker:
         Raises:
             BadMessageError: If a message cannot be read, or registration lacks something.
         """
+        frame = self._registered(color, depth, info, depth_info)
+        return replace(frame, camera=replace(frame.camera, quarter_turns=self.quarter_turns))
+
+    def _registered(self, color: Any, depth: Any, info: Any, depth_info: Any) -> RgbdFrame:
         color_frame, depth_frame = color.header.frame_id, depth.header.frame_id
         if color_frame == depth_frame:
             return frame_from_messages(color, depth, info, is_rectified=self.is_rectified)

@@ -31,6 +31,10 @@ class InputConfig:
         'auto', about='Reliability asked of publishers: auto (as offered), reliable, best_effort.')
     rectified: bool = setting(
         False, about='Images come with distortion taken out (image_rect): P holds, not K and D.')
+    quarter_turns: int = setting(
+        0, minimum=0, maximum=3,
+        about='Counterclockwise quarter turns that bring the image upright: 2 for a camera that '
+        'hangs upside down, 1 or 3 for one on its side.')
 
 
 @dataclass(frozen=True, slots=True)

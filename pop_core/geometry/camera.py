@@ -6,7 +6,7 @@ rational_polynomial and equidistant (Kannala and Brandt 2006).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -42,6 +42,7 @@ class Camera:
         cy: Principal point, v [px].
         distortion_model: Name as in CameraInfo; '' is a pure pinhole.
         d: Distortion coefficients in the model's order.
+        quarter_turns: Counterclockwise quarter turns that bring its image upright: 0 to 3.
 
     Raises:
         CameraError: If focal lengths are not positive or coefficients do not fit the model.
@@ -55,6 +56,7 @@ class Camera:
     cy: float
     distortion_model: str = ''
     d: Float[np.ndarray, 'd'] = field(default_factory=_no_distortion)
+    quarter_turns: int = 0
 
     def __post_init__(self) -> None:
         # OpenCV calibrates into a matrix of one row.
@@ -81,6 +83,9 @@ class Camera:
                 f'camera: expected {" or ".join(map(str, allowed))} finite coefficients of '
                 f'{self.distortion_model or "no distortion"}, found {self.d.tolist()}'
             )
+        if self.quarter_turns not in range(4):
+            raise CameraError(
+                f'camera: expected 0 to 3 quarter turns, found {self.quarter_turns}')
 
     @property
     def K(self) -> Float[np.ndarray, '3 3']:  # noqa: N802 - the field's word
@@ -92,6 +97,10 @@ class Camera:
         """Return whether any distortion coefficient differs from zero."""
         return bool(np.any(self.d))
 
+    @property
+    def _kind(self) -> tuple[int, int, str, int]:
+        return self.width, self.height, self.distortion_model, self.quarter_turns
+
     def sees_like(self, other: Camera, within_px: float = 0.0) -> bool:
         """Return whether two cameras see the same points at the same pixels.
 
@@ -99,9 +108,8 @@ class Camera:
             other: The other camera.
             within_px: By how much focal lengths and principal points may differ.
         """
-        kind = self.width, self.height, self.distortion_model
         return bool(
-            kind == (other.width, other.height, other.distortion_model)
+            self._kind == other._kind
             and (np.abs(self.K - other.K) <= within_px).all() and np.array_equal(self.d, other.d))
 
     def project(self, p_camera: Float[np.ndarray, 'n 3']) -> Float[np.ndarray, 'n 2']:
@@ -139,16 +147,39 @@ class Camera:
 
     def resized(self, factor: float) -> Camera:
         """Return the camera of the image resized by `factor` (centres: u' = (u+0.5)s - 0.5)."""
-        return Camera(
-            round(self.width * factor), round(self.height * factor),
-            self.fx * factor, self.fy * factor,
-            (self.cx + 0.5) * factor - 0.5, (self.cy + 0.5) * factor - 0.5,
-            self.distortion_model, self.d,
-        )
+        return replace(
+            self, width=round(self.width * factor), height=round(self.height * factor),
+            fx=self.fx * factor, fy=self.fy * factor,
+            cx=(self.cx + 0.5) * factor - 0.5, cy=(self.cy + 0.5) * factor - 0.5)
 
     def without_distortion(self) -> Camera:
         """Return the pure pinhole of the same intrinsics."""
-        return Camera(self.width, self.height, self.fx, self.fy, self.cx, self.cy)
+        return replace(self, distortion_model='', d=_no_distortion())
+
+    def turned(self) -> Camera:
+        """Return the camera whose image is this one's after a counterclockwise quarter turn.
+
+        Its x is this one's y, its y this one's -x.
+
+        Raises:
+            CameraError: If its sensor is tilted: no coefficients say so of the turned image.
+        """
+        return Camera(
+            self.height, self.width, self.fy, self.fx, self.cy, self.width - 1 - self.cx,
+            self.distortion_model, self._turned_distortion(), max(self.quarter_turns - 1, 0))
+
+    def _turned_distortion(self) -> Float[np.ndarray, 'd']:
+        d = self.d.copy()
+        if self.distortion_model == 'equidistant' or not d.size:
+            return d  # the same in all directions
+        d[2], d[3] = -self.d[3], self.d[2]  # decentring
+        if d.size >= 12:
+            d[8:10], d[10:12] = self.d[10:12], -self.d[8:10]  # thin prism
+        if np.any(d[12:]):
+            raise CameraError(
+                'camera: expected no tilted sensor (coefficients 13 and 14) beside quarter turns, '
+                f'found {self.d[12:].tolist()}')
+        return d
 
     def _project_distorted(self, p: Float[np.ndarray, 'n 3']) -> Float[np.ndarray, 'n 2']:
         zero = np.zeros(3)

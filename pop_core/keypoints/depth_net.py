@@ -31,6 +31,7 @@ from pop_core.keypoints.depth_votes import Cells, DepthNetConfig
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.joint_surface import joints_with_skin
 from pop_core.keypoints.onnx_session import OnnxSession, load_network
+from pop_core.keypoints.upright import detect_upright
 from pop_core.keypoints.vote_fusion import VotedPerson, fuse_votes
 from pop_core.rgbd import RgbdFrame
 
@@ -107,6 +108,9 @@ class DepthNetDetector:
 
     def detect(self, frame: RgbdFrame) -> list[Detection]:
         """Return the people of a frame, best first."""
+        return detect_upright(self._detect, frame)
+
+    def _detect(self, frame: RgbdFrame) -> list[Detection]:
         first = self.first_look(frame)
         closer = [self.closer(frame, first, k) for k in range(len(first))]
         people = distinct([look for look in closer if look is not None], self.config)

@@ -16,6 +16,12 @@ from pop_core.keypoints.network import (
 )
 from pop_core.keypoints.onnx_session import OnnxSession, load_network
 from pop_core.keypoints.people_selection import PeopleConfig, select_people
+from pop_core.keypoints.upright import (
+    box_turned_back,
+    detect_upright,
+    upright_box,
+    upright_frame,
+)
 from pop_core.rgbd import RgbdFrame
 
 MOST_BOXES = 20  # a top-down network runs once for each
@@ -40,6 +46,9 @@ class OnnxKeypointDetector:
 
     def detect(self, frame: RgbdFrame) -> list[Detection]:
         """Return the people of a frame, best first."""
+        return detect_upright(self._detect, frame)
+
+    def _detect(self, frame: RgbdFrame) -> list[Detection]:
         people = self.decoder.detect(frame.rgb, self.session.run)[:MOST_PEOPLE]
         return select_people(frame, people, self.config)
 
@@ -62,8 +71,13 @@ class OnnxTopDownDetector:
 
     def detect_in(self, frame: RgbdFrame, boxes: Sequence[PersonBox]) -> list[Detection]:
         """Return the people of a frame's boxes, best first; of many boxes only the best."""
-        people = self.decoder.detect_in(frame.rgb, boxes[:MOST_BOXES], self.session.run)
-        return select_people(frame, people, self.config)
+        best = [upright_box(box, frame.camera) for box in boxes[:MOST_BOXES]]
+
+        def find(upright: RgbdFrame) -> list[Detection]:
+            people = self.decoder.detect_in(upright.rgb, best, self.session.run)
+            return select_people(upright, people, self.config)
+
+        return detect_upright(find, frame)
 
 
 class OnnxOnePersonDetector(OnnxTopDownDetector):
@@ -73,6 +87,9 @@ class OnnxOnePersonDetector(OnnxTopDownDetector):
 
     def detect(self, frame: RgbdFrame) -> list[Detection]:
         """Return the person of a frame, or nobody."""
+        return detect_upright(self._detect, frame)
+
+    def _detect(self, frame: RgbdFrame) -> list[Detection]:
         people = self.decoder.detect(frame.rgb, self.session.run)
         return select_people(frame, people, self.config)
 
@@ -92,7 +109,8 @@ class OnnxBoxDetector:
 
     def find_boxes(self, frame: RgbdFrame) -> list[PersonBox]:
         """Return a box around every person, best first."""
-        return self.decoder.find_boxes(frame.rgb, self.session.run)
+        boxes = self.decoder.find_boxes(upright_frame(frame).rgb, self.session.run)
+        return [box_turned_back(box, frame.camera) for box in boxes]
 
 
 OnnxSource = OnnxKeypointDetector | OnnxTopDownDetector | OnnxBoxDetector

@@ -71,7 +71,8 @@ def find_ground(frame: RgbdFrame, tries: int = 60) -> Ground | None:
         tries: How many points, evenly over the upward ones, propose a plane.
     """
     points, normals = points_and_normals(frame.depth_m, frame.camera)
-    upward = np.flatnonzero(_upward(normals))
+    turns = frame.camera.quarter_turns
+    upward = np.flatnonzero(_upward(normals, turns))
     if len(upward) < MIN_SHARE * len(points) or len(points) < 50:
         return None
     proposals = upward[:: max(1, len(upward) // tries)]
@@ -86,7 +87,7 @@ def find_ground(frame: RgbdFrame, tries: int = 60) -> Ground | None:
         best = int(np.argmax(support))
         ground = _settled(normal[best], on_plane[best], points, normals, width)
         share_below = np.mean(ground.height(points) < -width)
-        if share_below <= MAX_BELOW and _upward(ground.normal):
+        if share_below <= MAX_BELOW and _upward(ground.normal, turns):
             return ground
         # A seat or a table with floor beside it: none of its points proposes a better plane.
         support[np.abs(ground.height(on_plane)) < width[proposals]] = 0.0
@@ -94,10 +95,15 @@ def find_ground(frame: RgbdFrame, tries: int = 60) -> Ground | None:
     return None
 
 
-def _upward(normal: Float[np.ndarray, '*n 3']) -> Bool[np.ndarray, '*n']:
+def _upward(
+    normal: Float[np.ndarray, '*n 3'], quarter_turns: int
+) -> Bool[np.ndarray, '*n']:
     """Return whether normals may be a floor's: cameras pitch more than they roll."""
+    x, y = normal[..., 0], normal[..., 1]
+    for _ in range(quarter_turns):
+        x, y = y, -x  # as the image turned upright has them
     # Camera y points down, so a floor's normal has negative y.
-    return np.asarray((normal[..., 1] < -TILT_COS) & (np.abs(normal[..., 0]) < ROLL_SIN))
+    return np.asarray((y < -TILT_COS) & (np.abs(x) < ROLL_SIN))
 
 
 def _settled(

@@ -26,6 +26,14 @@ def test_a_frame_read_back_is_the_frame_written(folder, scene):
     assert camera_json(frame.camera) == camera_json(scene[0].camera)
 
 
+def test_a_camera_may_say_how_it_is_mounted(folder):
+    path = folder / 'camera.json'
+    path.write_text(json.dumps(json.loads(path.read_text()) | {'quarter_turns': 2}))
+    camera = load_camera(path)
+    assert camera.quarter_turns == 2
+    assert camera_json(camera)['quarter_turns'] == 2
+
+
 def test_zero_depth_is_no_measurement(folder):
     depth_mm = cv2.imread(str(folder / 'depth.png'), cv2.IMREAD_UNCHANGED)
     depth_mm[3, 4] = 0

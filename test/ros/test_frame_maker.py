@@ -159,3 +159,11 @@ def test_the_node_s_setting_says_whether_images_are_rectified() -> None:
         camera = fitter._maker.make(color, depth, camera_info(bent, p=P.ravel())).camera
         assert camera.is_distorted != is_rectified
         assert camera.fx == (70.0 if is_rectified else COLOR.fx)
+
+
+def test_the_node_s_setting_says_how_the_camera_is_mounted() -> None:
+    color, *_ = messages()
+    depth = image(np.full((60, 80), 2.0, np.float32), '32FC1', 77, frame_id='color')
+    fitter = FrameFitter(Nobody(), PipelineConfig(), NodeConfig())
+    fitter.configure(PipelineConfig(), NodeConfig(input=InputConfig(quarter_turns=3)))
+    assert fitter._maker.make(color, depth, camera_info(COLOR)).camera.quarter_turns == 3

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -48,6 +50,36 @@ def test_resizing_keeps_the_image_corners() -> None:
 def test_unknown_or_incomplete_distortion_is_refused(model: str, d: list[float]) -> None:
     with pytest.raises(CameraError, match='expected'):
         Camera(640, 480, 525.0, 525.0, 320.0, 240.0, model, np.array(d))
+
+
+PRISM = Camera(640, 480, 525.0, 520.0, 319.5, 239.5, 'rational_polynomial', np.array(
+    [0.4, -2.3, 0.0005, -0.0002, 1.4, 0.3, -2.1, 1.3, 0.002, -0.001, 0.003, 0.001]))
+
+
+@pytest.mark.parametrize('camera', [PINHOLE, BROWN, RATIONAL, FISHEYE, PRISM])
+def test_a_camera_turned_by_a_quarter_sees_points_at_the_turned_pixels(camera: Camera) -> None:
+    rng = np.random.default_rng(0)
+    p = rng.uniform([-1, -0.8, 2], [1, 0.8, 4], (50, 3))
+    u, v = camera.project(p).T
+    turned = camera.turned().project(np.column_stack([p[:, 1], -p[:, 0], p[:, 2]]))
+    np.testing.assert_allclose(turned, np.column_stack([v, 639 - u]), atol=1e-6)
+
+
+def test_a_camera_turned_four_times_is_itself() -> None:
+    again = BROWN.turned().turned().turned().turned()
+    assert again.sees_like(BROWN, 1e-9)
+
+
+def test_a_tilted_sensor_cannot_be_turned() -> None:
+    tilted = Camera(640, 480, 525.0, 520.0, 319.5, 239.5, 'rational_polynomial', np.full(14, 0.01))
+    with pytest.raises(CameraError, match='tilted'):
+        tilted.turned()
+
+
+@pytest.mark.parametrize('turns', [-1, 4])
+def test_other_than_quarter_turns_are_refused(turns: int) -> None:
+    with pytest.raises(CameraError, match='0 to 3 quarter turns'):
+        replace(PINHOLE, quarter_turns=turns)
 
 
 def test_coefficients_as_opencv_calibrates_them_are_one_row() -> None:

@@ -1,5 +1,8 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from support.mounted import mounted, turned_points
 
 from pop_core.geometry.camera import Camera
 from pop_core.geometry.rotation import from_rotvec
@@ -35,6 +38,19 @@ def test_the_floor_of_a_tilted_camera_is_found(pitch: float, roll: float, height
     assert found is not None
     assert found.offset_m == pytest.approx(height, abs=0.02)  # sensor noise at 5 m is 5 cm
     assert np.degrees(np.arccos(found.normal @ truth.normal)) < 1.0
+
+
+@pytest.mark.parametrize('turns', [1, 2, 3])
+def test_a_camera_on_its_side_or_upside_down_finds_the_floor_too(turns: int) -> None:
+    depth, truth = room(0.3, 0.0, 1.5, noise=0.002)
+    seen = mounted(frame(depth), turns)
+    found = find_ground(seen)
+    assert found is not None
+    assert found.offset_m == pytest.approx(1.5, abs=0.02)
+    normal, = turned_points(found.normal[None], turns)
+    assert np.degrees(np.arccos(normal @ truth.normal)) < 1.0
+    forgotten = replace(seen, camera=replace(seen.camera, quarter_turns=0))
+    assert find_ground(forgotten) is None
 
 
 def test_a_table_above_the_floor_is_not_the_floor() -> None:
