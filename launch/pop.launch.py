@@ -1,6 +1,6 @@
 """Start the node for a camera, and rviz2 if asked for.
 
-ros2 launch pop_ros pop.launch.py camera:=realsense keypoints:=/path/to/network.onnx rviz:=true
+ros2 launch pop_ros pop.launch.py camera:=realsense rviz:=true
 """
 
 from pathlib import Path

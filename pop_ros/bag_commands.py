@@ -39,7 +39,7 @@ def make(
     The twelve frames of a folder, to be played like any recording:
 
       pop bag make frames/ --out recording
-      pop replay recording --keypoints network.onnx --out bodies --every-frame
+      pop replay recording --out bodies --every-frame
     """
     from pop_ros.bag_make import make_bag
     from pop_ros.progress import terminal_progress

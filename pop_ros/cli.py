@@ -17,7 +17,7 @@ ABOUT = """Bodies of people from RGB-D images, hidden limbs included.
 
 Start with [bold]pop demo[/bold], or fit a frame of your own:
 
-  pop fit FRAME --out results --keypoints network.onnx
+  pop fit FRAME --out results
 
 FRAME is a folder with color.png, depth.png (16 bit, millimetres) and camera.json.
 """

@@ -79,11 +79,11 @@ def replay(
 
     Every frame, and what it looks like:
 
-      pop replay recording.bag --keypoints network.onnx --out bodies --every-frame --pictures look
+      pop replay recording.bag --out bodies --every-frame --pictures look
 
     Ten seconds of two bags over and over, for rviz with use_sim_time:
 
-      pop replay a.mcap b.mcap --keypoints network.onnx --out bodies --start 60 --duration 10
+      pop replay a.mcap b.mcap --out bodies --start 60 --duration 10
       --loop --clock
 
     A damaged bag is replayed as far as it can be read. Exit code 1 says that no frame was fitted.
