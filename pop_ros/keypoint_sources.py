@@ -84,15 +84,20 @@ def keep_people(detector: object, config: PeopleConfig) -> None:
 
 def apply_settings(detector: object, config: PipelineConfig) -> None:
     """Tell a source the settings of people.*, fusion.* and depth_net.*."""
-    from pop_core.keypoints.depth_net import DepthNetDetector
     from pop_core.keypoints.fusion import FusedDetector
 
     keep_people(detector, config.people)
-    for part in _parts(detector):
-        if isinstance(part, DepthNetDetector):
-            part.config = config.depth_net
+    for part in depth_networks(detector):
+        part.config = config.depth_net
     if isinstance(detector, FusedDetector):
         detector.config = config.fusion
+
+
+def depth_networks(detector: object) -> list[DepthNetDetector]:
+    """Return the depth networks of a source."""
+    from pop_core.keypoints.depth_net import DepthNetDetector
+
+    return [part for part in _parts(detector) if isinstance(part, DepthNetDetector)]
 
 
 def _parts(detector: object) -> Sequence[Any]:

@@ -23,7 +23,7 @@ def scene() -> tuple[RgbdFrame, Detection]:
 
 def write_frame(folder: Path, frame: RgbdFrame, people: list[Detection] | None) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
-    depth_mm = np.rint(frame.depth_m * 1000).astype(np.uint16)
+    depth_mm = np.rint(np.nan_to_num(frame.depth_m) * 1000).astype(np.uint16)
     cv2.imwrite(str(folder / 'color.png'), frame.rgb[..., ::-1])
     cv2.imwrite(str(folder / 'depth.png'), depth_mm)
     (folder / 'camera.json').write_text(json.dumps(camera_json(frame.camera)))
