@@ -87,7 +87,7 @@ def run(argv: list[str]) -> int:
 def parse(argv: list[str]) -> argparse.Namespace:
     """Return the options of the command line."""
     parser = argparse.ArgumentParser(prog='python -m benchmarks accuracy', description=__doc__)
-    parser.add_argument('--frames', type=int, default=100, help='number of scenes')
+    parser.add_argument('--frames', type=int, default=500, help='number of scenes')
     parser.add_argument('--seed', type=int, default=FIRST_SEED, help='seed of the first scene')
     parser.add_argument('--json', type=Path, help='file to write all figures into')
     parser.add_argument('--pictures', type=Path, help='folder for curves and error heat maps')

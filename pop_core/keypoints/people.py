@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from jaxtyping import Float
 
 from pop_core.keypoints.detection import Detection
+from pop_core.keypoints.keypoint_sets import KeypointSet, shared_joints
 
 # Head top, hands and toes lie outside the keypoints by about this share of the person's extent.
 BOX_MARGIN = 0.15
@@ -27,3 +30,20 @@ def detection_of(
     margin = BOX_MARGIN * float((high - low).max())
     box_px = np.concatenate([low - margin, high + margin])
     return Detection(px, np.where(found, scores, 0.0).astype(np.float64), box_px)
+
+
+def detections_of(
+    keypoints: KeypointSet,
+    people: Iterable[tuple[Float[np.ndarray, 'k 2'], Float[np.ndarray, 'k']]],
+) -> list[Detection]:
+    """Return people whose keypoints are of a set, best first.
+
+    Who shows none of the shared joints, only ears, say, is nobody.
+
+    Args:
+        keypoints: The set.
+        people: Pixels (u, v) and scores 0..1 of each person's keypoints.
+    """
+    shared = [shared_joints(keypoints, uv, scores) for uv, scores in people]
+    found = [detection_of(uv, scores) for uv, scores in shared if scores.any()]
+    return sorted(found, key=lambda person: -person.score)
