@@ -210,8 +210,11 @@ def check_snapshot(player: Player, shots: Path, recording: Recording) -> None:
 
 def stopped(main: str, number: signal.Signals, delay_s: float) -> tuple[int, str]:
     """Start a program, send a signal soon after; return its exit code and what it complained."""
-    # Python itself must have started: before that no program can catch anything.
-    code = f'import sys; sys.path.insert(0, {str(ROOT)!r}); print("up", flush=True); {main}'
+    # Python itself must have started: before that no program can catch anything. Whoever runs the
+    # tests in the background of a shell hands down that Ctrl-C is ignored.
+    code = (
+        'import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); '
+        f'sys.path.insert(0, {str(ROOT)!r}); print("up", flush=True); {main}')
     process = subprocess.Popen(
         [sys.executable, '-c', code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
