@@ -64,15 +64,16 @@ def test_frames_after_a_fault_are_fitted_and_the_fault_is_counted(
     node: LifecycleNode, capfd: pytest.CaptureFixture[str], tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    (tmp_path / '0.json').write_text('{"people": []}')
+    for second in range(1, 7):  # far enough apart that each is looked at, though nobody is there
+        (tmp_path / f'{second}000000000.json').write_text('{"people": []}')
     work, statistics = prepared(node, tmp_path)
     color, depth, info = build(next(iter(PLAIN)), 0)
-    color.header.stamp = depth.header.stamp = info.header.stamp = Time()
     sees = looks.look_for_people
     with Listener() as clock:
         assert clock.spin_until(lambda: work.is_ready, READY_S)
         work.run(True)
         for count in range(1, 7):
+            color.header.stamp = depth.header.stamp = info.header.stamp = Time(sec=count)
             monkeypatch.setattr(looks, 'look_for_people', divide_by_zero if count % 2 else sees)
             work.put(RgbdMessages(color, depth, info, 0.0))
             assert clock.spin_until(lambda: statistics.snapshot().pending == 0, 10)
