@@ -7,6 +7,7 @@
 #   make messages     the ROS messages of msg_defs, and those of other packages that tests need,
 #                     without ROS (needs g++ and python3-dev)
 #   make viz          add the rerun SDK (200 MB), for `--rerun` and its test
+#   make train        add PyTorch (1 GB), for `python -m pop_core.training` and its tests
 #   make docs         write the generated pages of docs/ anew
 #   make pictures     draw the pictures of docs/ anew (that of rviz needs ROS 1)
 #
@@ -21,7 +22,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 TEST_MESSAGES := tf2_msgs hri_msgs zed_msgs vision_msgs yolo_msgs
 SOURCES := $(shell find pop_core pop_ros -type f -not -name '*.pyc') setup.py package.xml
 
-.PHONY: demo test check bench-gate messages viz docs pictures clean
+.PHONY: demo test check bench-gate messages train viz docs pictures clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.installed
@@ -42,6 +43,9 @@ messages: $(BIN)/python
 	set -e; for package in $(TEST_MESSAGES); do \
 	  POP_MESSAGE_TOOLS=$(abspath build/pop_msgs/tools) \
 	    scripts/build_messages.sh build/$$package $(BIN)/python test/support/$$package; done
+
+train: $(VENV)/.tools
+	$(PIP) install --quiet --constraint constraints.txt --no-build-isolation '.[train]'
 
 viz: $(VENV)/.tools
 	$(PIP) install --quiet --constraint constraints.txt 'rerun-sdk>=0.23'

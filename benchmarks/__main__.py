@@ -8,6 +8,7 @@ import pkgutil
 import sys
 
 import benchmarks
+from pop_core.errors import PopError
 
 
 def main(argv: list[str]) -> int:
@@ -18,7 +19,11 @@ def main(argv: list[str]) -> int:
         print(f'benchmarks: expected one of {", ".join(names)}, found {found}', file=sys.stderr)
         return 2
     module = importlib.import_module(f'benchmarks.{argv[0]}')
-    return int(module.run(argv[1:]))
+    try:
+        return int(module.run(argv[1:]))
+    except (PopError, OSError) as error:
+        print(f'benchmarks {argv[0]}: {error}', file=sys.stderr)
+        return 2
 
 
 def runnable() -> list[str]:

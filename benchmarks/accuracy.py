@@ -33,24 +33,37 @@ from benchmarks.accuracy_summary import (
     summarise,
     table,
 )
+from benchmarks.arguments import positive
 from pop_core.body.default_body import default_body
 from pop_core.body.model import BodyModel
 from pop_core.config import PipelineConfig
+from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.keypoints.detection import KeypointDetector
 from pop_core.pipeline import BodyPipeline
 from pop_core.retrieval.default_library import default_library
 from pop_core.retrieval.pose_library import PoseLibrary
-from pop_core.settings import Value, apply_settings, list_settings
+from pop_core.retrieval.retrieve import RetrievalConfig
+from pop_core.settings import Value, apply_settings
 from pop_core.synthesis.scene_config import SceneConfig
 from pop_core.synthesis.scenes import SyntheticScene, synthesise_scene
+from pop_ros.settings_flags import with_flags
 
 FIRST_SEED = 10_000  # far from the seeds of tests and training
 MAIN = 'pop'
+
+
+def of_k(k: int) -> dict[str, Value]:
+    """Return the settings of K hypotheses: as large a share of them is fitted on as of the six."""
+    fitting, usual = FittingConfig(), RetrievalConfig().candidates
+    kept = {
+        f'fitting.{name}': max(1, round(k * getattr(fitting, name) / usual))
+        for name in ('surface_hypotheses', 'final_hypotheses')}
+    return {'retrieval.candidates': k, **kept}
+
+
 # Name and the settings that differ from the main method's.
 ABLATIONS: dict[str, dict[str, Value]] = {
-    'K=1': {'retrieval.candidates': 1},
-    'K=3': {'retrieval.candidates': 3},
-    'K=12': {'retrieval.candidates': 12},
+    'K=1': of_k(1), 'K=3': of_k(3), 'K=12': of_k(12),
     'no free space': {'fitting.free_space': False},
     'no cond. prior': {'fitting.neighbour_weight': 0.0},
 }
@@ -59,7 +72,7 @@ ABLATIONS: dict[str, dict[str, Value]] = {
 def run(argv: list[str]) -> int:
     """Measure, print the table, write JSON and pictures when asked to."""
     options = parse(argv)
-    config = apply_settings(PipelineConfig(), parse_settings(options.set))
+    config = with_flags(PipelineConfig(), options.set)
     model, console = default_body(), make_console()
     detector = GivenDetections()
     console.print('Loading the pose library ...')
@@ -87,7 +100,7 @@ def run(argv: list[str]) -> int:
 def parse(argv: list[str]) -> argparse.Namespace:
     """Return the options of the command line."""
     parser = argparse.ArgumentParser(prog='python -m benchmarks accuracy', description=__doc__)
-    parser.add_argument('--frames', type=int, default=500, help='number of scenes')
+    parser.add_argument('--frames', type=positive, default=500, help='number of scenes')
     parser.add_argument('--seed', type=int, default=FIRST_SEED, help='seed of the first scene')
     parser.add_argument('--json', type=Path, help='file to write all figures into')
     parser.add_argument('--pictures', type=Path, help='folder for curves and error heat maps')
@@ -98,18 +111,6 @@ def parse(argv: list[str]) -> argparse.Namespace:
     parser.add_argument(
         '--set', action='append', default=[], metavar='NAME=VALUE', help='change a setting')
     return parser.parse_args(argv)
-
-
-def parse_settings(pairs: list[str], config: object | None = None) -> dict[str, Value]:
-    """Return `NAME=VALUE` texts as settings of a configuration, each of its own type."""
-    listed = list_settings(PipelineConfig() if config is None else config)
-    kinds = {item.name: type(item.default) for item in listed}
-    values: dict[str, Value] = {}
-    for pair in pairs:
-        name, _, text = pair.partition('=')
-        kind = kinds.get(name, str)
-        values[name] = text.lower() in ('1', 'true', 'yes') if kind is bool else kind(text)
-    return values
 
 
 def make_methods(

@@ -68,7 +68,9 @@ class Pipeline:
         """Return the bodies of a frame and the wall time per step [ms]."""
         result = self.pipeline.process(frame)
         guesses = [
-            Guess(b.parameters, b.mask, b.joint_covariance, b.runners_up) for b in result.bodies]
+            Guess(b.parameters, b.mask, b.joint_covariance,
+                  tuple(other.parameters for other in b.runners_up))
+            for b in result.bodies]
         return guesses, dict(result.times_ms)
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 import cv2
 from rich.progress import track
 
+from benchmarks.arguments import positive
 from benchmarks.detector_pictures import draw_detections
 from benchmarks.detector_real import REAL, real_frames
 from benchmarks.detector_scores import DetectorScores
@@ -52,7 +53,7 @@ def parse(argv: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog='python -m benchmarks detector', description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--scenes', type=int, default=100, help='number of synthetic scenes')
+    parser.add_argument('--scenes', type=positive, default=100, help='number of synthetic scenes')
     parser.add_argument('--seed', type=int, default=FIRST_SEED, help='seed of the first')
     parser.add_argument(
         '--keypoints', default='depth', help="'depth', the embedded network, or a source as in "

@@ -17,9 +17,10 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from benchmarks.accuracy import make_console, parse_settings
+from benchmarks.accuracy import make_console
 from benchmarks.accuracy_cache import cache_folder, run_key
 from benchmarks.accuracy_methods import GivenDetections
+from benchmarks.arguments import positive
 from benchmarks.tracking_methods import METHODS, follow, make_methods
 from benchmarks.tracking_pictures import draw_chart
 from benchmarks.tracking_records import load_tables, save_tables
@@ -35,11 +36,11 @@ from pop_core.body.default_body import default_body
 from pop_core.config import PipelineConfig
 from pop_core.pipeline import BodyPipeline
 from pop_core.retrieval.default_library import default_library
-from pop_core.settings import apply_settings
 from pop_core.synthesis.sensor_noise import SENSORS
 from pop_core.synthesis.sequence import SequenceConfig, film_sequence
 from pop_core.synthesis.sequence_names import SequenceKind
 from pop_core.tracking.tracking_config import TrackingConfig
+from pop_ros.settings_flags import with_flags
 
 FIRST_SEED = 20_000  # far from the seeds of tests, training and single scenes
 WARM_FRAMES = 3
@@ -77,12 +78,12 @@ def parse(argv: list[str]) -> argparse.Namespace:
         prog='python -m benchmarks tracking', description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter)
     kinds = [kind.value for kind in SequenceKind]
-    parser.add_argument('--frames', type=int, default=120, help='frames of each sequence')
+    parser.add_argument('--frames', type=positive, default=120, help='frames of each sequence')
     parser.add_argument('--rate', type=float, default=30.0, help='frames per second')
     parser.add_argument(
         '--kinds', nargs='+', choices=kinds, default=kinds, metavar='KIND',
         help=f'of {", ".join(kinds)}')
-    parser.add_argument('--seeds', type=int, default=1, help='sequences of each kind')
+    parser.add_argument('--seeds', type=positive, default=1, help='sequences of each kind')
     parser.add_argument('--seed', type=int, default=FIRST_SEED, help='seed of the first')
     parser.add_argument(
         '--sensor', choices=sorted(SENSORS), default='structured_light', help='depth noise')
@@ -101,8 +102,7 @@ def configs(pairs: list[str]) -> tuple[PipelineConfig, TrackingConfig]:
     prefix = 'tracking.'
     own = [pair[len(prefix):] for pair in pairs if pair.startswith(prefix)]
     others = [pair for pair in pairs if not pair.startswith(prefix)]
-    return (apply_settings(PipelineConfig(), parse_settings(others)),
-            apply_settings(TrackingConfig(), parse_settings(own, TrackingConfig())))
+    return with_flags(PipelineConfig(), others), with_flags(TrackingConfig(), own)
 
 
 def measure(options: argparse.Namespace, console: Console) -> list[FollowedSequence]:

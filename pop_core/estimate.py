@@ -68,6 +68,24 @@ class Track:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class RunnerUp:
+    """Another explanation of a person: a hypothesis that did not win.
+
+    Args:
+        parameters: SMPL parameters in the camera frame, where its fit ended.
+        excess_cost: What it costs beyond the winner, both before the winner's polish: E_depth on
+            the same pixels, keypoints and priors. Never negative among the finished, 0 of those
+            who are followed.
+        finished: Whether it was fitted to the end; others were left behind after the joints or
+            the first surface steps, and are as far off as their pose.
+    """
+
+    parameters: BodyParameters
+    excess_cost: float
+    finished: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class BodyEstimate:
     """One fitted person.
 
@@ -81,7 +99,8 @@ class BodyEstimate:
         mask: Pixels of the frame that show this person: the paper's H, and holes in its depth.
         score: Confidence 0..1 that this is a person fitted right.
         energies: Final energies by name.
-        runners_up: Parameters of the other hypotheses, best first.
+        runners_up: The other hypotheses, cheapest first; of people who are followed those that are
+            followed beside them, which cost about the same.
         track: Which person of a sequence this is; None where each frame stands alone.
     """
 
@@ -94,7 +113,7 @@ class BodyEstimate:
     mask: Bool[np.ndarray, 'h w']
     score: float
     energies: Mapping[str, float] = field(default_factory=dict)
-    runners_up: tuple[BodyParameters, ...] = ()
+    runners_up: tuple[RunnerUp, ...] = ()
     track: Track | None = None
 
 

@@ -128,18 +128,37 @@ class BodyPipeline:
         statuses = [self.admit(joints) for joints in lifted]
         scene = Scene(frame, ground, noise, np.zeros(frame.depth_m.shape, dtype=bool))
         bodies: list[BodyEstimate] = []
+        nearer: BodyEstimate | None = None
         for i in nearest_first(distance_m, detections):
             if statuses[i] is not EstimateStatus.OK:
                 continue
             if len(bodies) >= self.config.max_people:
                 statuses[i] = EstimateStatus.TOO_MANY
                 continue
+            if nearer is not None:
+                scene = self.behind(scene, nearer)
             person = self.fit_person(scene, detections[i], lifted[i], watch)
-            statuses[i] = person.status
-            if person.estimate is not None:
-                bodies.append(person.estimate)
-                scene = replace(scene, taken=scene.taken | person.estimate.mask)
+            statuses[i], nearer = person.status, person.estimate
+            if nearer is not None:
+                bodies.append(nearer)
         return bodies, statuses
+
+    def behind(self, scene: Scene, nearer: BodyEstimate) -> Scene:
+        """Return the scene as it is for whoever is farther than a fitted person.
+
+        The person's pixels are taken. They hide what lies behind them, also where nothing was
+        measured: there the fitted body's depth stands for the missing one.
+        """
+        frame = scene.frame
+        holes = nearer.mask & np.isnan(frame.depth_m)
+        if holes.any():
+            body = self.fitter.full
+            rendered = render_depth(
+                nearer.vertices, body.faces, frame.camera, closed=body.is_closed)
+            holes &= rendered.covered
+            frame = replace(
+                frame, depth_m=np.where(holes, rendered.depth_m, frame.depth_m))
+        return replace(scene, frame=frame, taken=scene.taken | nearer.mask)
 
     def fit_person(
         self,

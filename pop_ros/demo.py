@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 
 import numpy as np
@@ -116,11 +117,27 @@ def record_scenes(
     return scenes
 
 
-def play_to_node(paths: DemoPaths, say: Callable[[str], None]) -> ReplaySummary:
+class DemoKeypoints(Enum):
+    """Where the demo's node takes keypoints from."""
+
+    DEPTH = 'depth'
+    TRUTH = 'truth'
+
+
+def source_of(paths: DemoPaths, keypoints: DemoKeypoints) -> SourceArguments:
+    """Return the node's keypoint source: the embedded network, or noisy truth from files."""
+    if keypoints is DemoKeypoints.TRUTH:
+        return SourceArguments('json', paths.keypoints)
+    return SourceArguments()
+
+
+def play_to_node(
+    paths: DemoPaths, keypoints: DemoKeypoints, say: Callable[[str], None]
+) -> ReplaySummary:
     """Play the bag to a node in its own process and record what it publishes."""
     request = ReplayRequest(
         bags=(paths.camera_bag,), out=paths.bodies_bag, ros1=None,
-        sources=SourceArguments('json', paths.keypoints), topics=(None, None, None), slop_s=0.01,
+        sources=source_of(paths, keypoints), topics=(None, None, None), slop_s=0.01,
         pace=Pace(rate=1 / (RATE_HZ * SECONDS_PER_FRAME)))
     return run_replay(request, say)
 

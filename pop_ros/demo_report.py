@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from pop_core import __version__
 from pop_core.body.default_body import default_body
-from pop_ros.demo import DemoFrame, DemoPaths
+from pop_ros.demo import DemoFrame, DemoKeypoints, DemoPaths, source_of
 from pop_ros.replay import ReplaySummary
 from pop_ros.report import Picture, Report
 from pop_ros.show_recording import HOW_TO_TURN, LEGEND, MAX_SCENES, PAGE_PX
@@ -20,8 +21,18 @@ LEAD = (
     'for; what you see was read back from the bag of its outputs.')
 
 
+ABOUT = {
+    DemoKeypoints.DEPTH:
+        'The person was found in depth by the small network that comes with the package, whose '
+        'limbs are coarse; pop demo --keypoints truth shows what a good RGB network leads to.',
+    DemoKeypoints.TRUTH:
+        'Keypoints are the truth with the noise, misses and outliers of a good RGB network.',
+}
+
+
 def write_demo_report(
-    paths: DemoPaths, frames: Sequence[DemoFrame], summary: ReplaySummary
+    paths: DemoPaths, frames: Sequence[DemoFrame], summary: ReplaySummary,
+    keypoints: DemoKeypoints,
 ) -> None:
     """Write the report of a demo."""
     report = Report('pop: a body, hidden limbs included', LEAD)
@@ -35,12 +46,12 @@ def write_demo_report(
     report.heading('Distance of joints from the truth')
     report.table(('joints', 'count', 'mean', 'median', '90 %'), error_rows(frames))
     report.text(
-        'One short sequence whose keypoints are the truth plus noise is a demonstration and no '
-        'benchmark; for figures, run python -m benchmarks accuracy.')
+        f'{ABOUT[keypoints]} One short sequence is a demonstration and no benchmark; for figures, '
+        'run python -m benchmarks accuracy.')
     report.heading('What the node said')
     report.commands(summary.text().splitlines())
     report.heading('Look further')
-    report.commands(_commands(paths))
+    report.commands(_commands(paths, keypoints))
     report.text(f'Written by pop {__version__}.')
     report.write(paths.report)
 
@@ -65,10 +76,10 @@ def _caption(frame: DemoFrame) -> str:
     return ', '.join(parts) + ' in the mean'
 
 
-def _commands(paths: DemoPaths) -> list[str]:
-    source = f'--keypoints json --keypoints-dir {paths.keypoints.name}'
+def _commands(paths: DemoPaths, keypoints: DemoKeypoints) -> list[str]:
+    flags = ' '.join(source_of(DemoPaths(Path()), keypoints).as_flags())
     return [
         f'cd {paths.root.resolve()}',
-        f'pop replay {paths.camera_bag.name} {source} --every-frame --out bodies_again',
+        f'pop replay {paths.camera_bag.name} {flags} --every-frame --out bodies_again',
         f'ros2 bag play {paths.bodies_bag.name}    # with rviz2 beside it',
     ]

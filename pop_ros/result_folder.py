@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,20 @@ import cv2
 import numpy as np
 
 from pop_core.body.model import BodyModel, rest_parameters
+from pop_core.body.model_digest import model_digest
 from pop_core.body.skinning import vertices
-from pop_core.estimate import BodyEstimate, EstimateStatus, FrameResult, JointState
+from pop_core.estimate import (
+    BodyEstimate,
+    EstimateStatus,
+    FrameResult,
+    JointState,
+    RunnerUp,
+    TrackState,
+)
+from pop_core.geometry.camera import Camera
 from pop_core.rendering.pictures import result_picture
 from pop_core.rgbd import RgbdFrame
+from pop_ros.camera_file import camera_json
 
 
 def write_results(folder: Path, frame: RgbdFrame, result: FrameResult, model: BodyModel) -> None:
@@ -32,7 +43,7 @@ def write_results(folder: Path, frame: RgbdFrame, result: FrameResult, model: Bo
     for index, body in enumerate(result.bodies):
         np.savez_compressed(folder / f'person_{index}.npz', **person_arrays(body, model))
     write_png(folder / 'overlay.png', result_picture(frame, result, model.f))
-    content = json.dumps(result_json(result), indent=2)
+    content = json.dumps(result_json(result, model, frame.camera), indent=2)
     (folder / 'result.json').write_text(content + '\n', encoding='utf-8')
 
 
@@ -55,12 +66,31 @@ def person_arrays(body: BodyEstimate, model: BodyModel) -> dict[str, Any]:
         'tpose_vertices': vertices(model, tpose).astype(np.float32),
         'faces': model.f.astype(np.int32),
         'score': np.float64(body.score),
+        'joint_rotations': body.joint_rotations,
+        **runner_up_arrays(body.runners_up, len(parameters.betas)),
+        **_track_arrays(body),
     }
 
 
-def result_json(result: FrameResult) -> dict[str, Any]:
+def runner_up_arrays(runners_up: Sequence[RunnerUp], n_betas: int) -> dict[str, Any]:
+    """Return the other hypotheses of a person, cheapest first, one row each."""
+    every = [other.parameters for other in runners_up]
+    shapes = {
+        'transl': (3,), 'global_orient': (3,), 'body_pose': (23, 3), 'betas': (n_betas,),
+        'scale': ()}
+    arrays = {
+        f'runners_up_{name}': np.array([getattr(p, name) for p in every]).reshape(-1, *shape)
+        for name, shape in shapes.items()}
+    return arrays | {
+        'runners_up_excess_cost': np.array([other.excess_cost for other in runners_up]),
+        'runners_up_finished': np.array([other.finished for other in runners_up], dtype=bool)}
+
+
+def result_json(result: FrameResult, model: BodyModel, camera: Camera) -> dict[str, Any]:
     """Return what is worth reading of a result without loading arrays."""
     return {
+        'body': {'name': model.name, 'digest': model_digest(model)},
+        'camera': camera_json(camera),
         'status': status_sentence(result),
         'people': [_person_json(index, body) for index, body in enumerate(result.bodies)],
         'detections': [status.value for status in result.statuses],
@@ -91,11 +121,25 @@ def write_png(path: Path, pixels: np.ndarray) -> None:
 
 def _person_json(index: int, body: BodyEstimate) -> dict[str, Any]:
     states = Counter(JointState(int(state)).name.lower() for state in body.joint_state)
-    return {
+    tracked = {} if body.track is None else {
+        'track': {'id': body.track.id, 'state': body.track.state.name.lower()}}
+    return tracked | {
         'file': f'person_{index}.npz',
         'score': round(float(body.score), 4),
         'pelvis_m': np.round(body.joints[0], 4).tolist(),
         'joints_by_state': dict(states),
         'pixels': int(body.mask.sum()),
         'energies': {name: float(value) for name, value in body.energies.items()},
+        'runners_up': [
+            {'excess_cost': round(other.excess_cost, 4), 'finished': other.finished}
+            for other in body.runners_up],
     }
+
+
+def _track_arrays(body: BodyEstimate) -> dict[str, Any]:
+    """Return who a followed person is; nothing of frames that stand alone."""
+    if body.track is None:
+        return {}
+    return {
+        'track_id': np.int64(body.track.id), 'track_state': np.int64(TrackState(body.track.state)),
+        'joint_unseen_s': body.track.joint_unseen_s}

@@ -25,7 +25,7 @@ LAYERS = (
     ('pop_core.errors',),
 )
 LINE = {part: number for number, parts in enumerate(LAYERS) for part in parts}
-ABOVE_ALL = ('pop_core.synthesis', 'pop_core.training', 'pop_core.batch')
+ABOVE_ALL = ('pop_core.synthesis', 'pop_core.training')
 MAY_USE_SYNTHESIS = re.compile(r'pop_ros\.(\w+_commands?|demo\w*)$')
 ROS = re.compile(r'^(rclpy|rosbags|\w+_msgs|builtin_interfaces|rcl_interfaces|ament_\w+)(\.|$)')
 

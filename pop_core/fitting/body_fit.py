@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from pop_core.body.model import BodyModel, BodyParameters
+from pop_core.estimate import RunnerUp
 from pop_core.fitting.body_state import BodyState, FitBody
 from pop_core.fitting.depth_consistency import Visibility, depth_energy, see_body
 from pop_core.fitting.disagreement import Disagreement, disagreement, unnamed_joints
@@ -46,7 +47,7 @@ class BodyFit:
         coarse: The winner on the coarse mesh.
         segment: Pixels of the observation that show the person.
         energies: Final energies by name.
-        runners_up: The other finalists, best first.
+        runners_up: The other hypotheses, cheapest first.
         disagreement: What other hypotheses and keypoints say against the winner.
         sides_exchanged: Whether the keypoints' left turned out to be right.
     """
@@ -57,7 +58,7 @@ class BodyFit:
     coarse: BodyState
     segment: Bool[np.ndarray, 'h w']
     energies: dict[str, float]
-    runners_up: tuple[BodyParameters, ...]
+    runners_up: tuple[RunnerUp, ...]
     disagreement: Disagreement
     sides_exchanged: bool = False
 
@@ -95,9 +96,11 @@ class BodyFitter:
         for hypothesis in hypotheses:
             self.steps.fit_surface(hypothesis, observation, EARLY_SCALES_M, free_space=False)
         judge = self._judge(observation, self._compare(hypotheses, observation, unclaimed))
+        finalists = _best(hypotheses, self.config.final_hypotheses)
+        left_behind = [hypothesis for hypothesis in started if hypothesis not in finalists]
         hypotheses = [
             exchange_limbs(hypothesis, [h for h in started if h is not hypothesis], judge)
-            for hypothesis in _best(hypotheses, self.config.final_hypotheses)]
+            for hypothesis in finalists]
         if self.config.other_readings:
             hypotheses = [best_reading(each, observation, judge) for each in hypotheses]
         for hypothesis in hypotheses:
@@ -111,6 +114,8 @@ class BodyFitter:
                 break
             hypotheses, segment = kept, self._compare(kept, observation, unclaimed)
         winner, *others = _best(hypotheses, len(hypotheses))
+        self._judge(observation, segment)(left_behind)
+        runners_up = _runners_up(winner, others, left_behind)
         excess = [other.cost - winner.cost for other in others]
         named = observation
         if self.config.other_readings:
@@ -120,7 +125,7 @@ class BodyFitter:
             body.state, [other.state for other in others], excess,
             [hypothesis.state for hypothesis in started],
             unnamed_joints(body.state, named.lifted))
-        fit = self._finish(body, others, named, left)
+        fit = self._finish(body, runners_up, named, left)
         return replace(fit, sides_exchanged=named is not observation)
 
     def costs(
@@ -193,7 +198,7 @@ class BodyFitter:
         return hypothesis
 
     def _finish(
-        self, winner: Hypothesis, others: Sequence[Hypothesis], observation: Observation,
+        self, winner: Hypothesis, runners_up: tuple[RunnerUp, ...], observation: Observation,
         left: Disagreement,
     ) -> BodyFit:
         """Return the winner with its energies and the curvature of its cost."""
@@ -211,8 +216,20 @@ class BodyFitter:
         }
         return BodyFit(
             coarse.parameters, assemble(blocks, self.coarse.size).hessian, visibility, coarse,
-            segment, energies, tuple(other.state.parameters for other in others), left)
+            segment, energies, runners_up, left)
 
 
 def _best(hypotheses: Sequence[Hypothesis], count: int) -> list[Hypothesis]:
     return sorted(hypotheses, key=lambda hypothesis: hypothesis.cost)[:count]
+
+
+def _runners_up(
+    winner: Hypothesis, finished: Sequence[Hypothesis], left_behind: Sequence[Hypothesis]
+) -> tuple[RunnerUp, ...]:
+    """Return the hypotheses that did not win, cheapest first; all judged on the same pixels."""
+    every = [
+        *((other, True) for other in finished), *((other, False) for other in left_behind)]
+    every.sort(key=lambda item: item[0].cost)
+    return tuple(
+        RunnerUp(other.state.parameters, other.cost - winner.cost, is_finished)
+        for other, is_finished in every)

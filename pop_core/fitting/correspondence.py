@@ -72,8 +72,8 @@ def match_points(
         return no_pairs()
     vertex = facing[nearest_as_sensors_err(state.clothed[facing], points, scale_m, noise)]
     # A point recognised as an arm never pulls on the chest it rests on.
-    fits = (parts < 0) | NEAR_PARTS[parts, state.body.main_bone[vertex]]
-    return _plane_pairs(state, vertex, points, EFFECTIVE_POINTS * fits, scale_m, noise)
+    worth = EFFECTIVE_POINTS * _belong_together(parts, state.body.main_bone[vertex])
+    return _plane_pairs(state, vertex, points, worth, scale_m, noise)
 
 
 def nearest_as_sensors_err(
@@ -103,16 +103,33 @@ def nearest_as_sensors_err(
 
 
 def match_vertices(
-    state: BodyState, visibility: Visibility, scale_m: float, noise: DepthNoise
+    state: BodyState, visibility: Visibility, observation: Observation, scale_m: float
 ) -> Pairs:
-    """Pair every visible vertex with the point measured at its pixel."""
+    """Pair every visible vertex with the point measured at its pixel, unless it is another part.
+
+    Args:
+        state: Body.
+        visibility: Sight of its vertices in the observation.
+        observation: What the sensor says.
+        scale_m: Scale of the robust kernel [m].
+    """
     vertex = np.flatnonzero(visibility.sight == Sight.VISIBLE)
     if len(vertex) == 0:
         return no_pairs()
     seen = state.vertices[vertex]
     target = seen * (1 + visibility.gap_m[vertex] / seen[:, 2])[:, None]
     worth = np.full(len(vertex), VERTEX_SHARE * EFFECTIVE_POINTS)
-    return _plane_pairs(state, vertex, target, worth, scale_m, noise)
+    if observation.labels is not None:
+        u, v = observation.depth_at(seen)[1].T
+        worth *= _belong_together(observation.labels[v, u], state.body.main_bone[vertex])
+    return _plane_pairs(state, vertex, target, worth, scale_m, observation.noise)
+
+
+def _belong_together(
+    parts: Int[np.ndarray, 'n'], bones: Int[np.ndarray, 'n']
+) -> Bool[np.ndarray, 'n']:
+    """Return where a recognised part is a vertex's own or near it, or nothing was recognised."""
+    return np.asarray((parts < 0) | NEAR_PARTS[parts, bones])
 
 
 def _plane_pairs(

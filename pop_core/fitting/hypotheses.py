@@ -167,7 +167,7 @@ class HypothesisSteps:
         points, parts = thin_points(observation, segment, self.config.surface_points)
         toward = match_points(
             state, visibility, points, parts, scale_m, observation.noise)
-        back = match_vertices(state, visibility, scale_m, observation.noise)
+        back = match_vertices(state, visibility, observation, scale_m)
         # Point to point fades as the kernel shrinks and normals can be trusted.
         tangential, apart = tangential_pairs(toward, TANGENTIAL_SHARE * scale_m / WIDEST_M)
         planes, off_plane = merged_pairs(join_pairs([toward, back]))

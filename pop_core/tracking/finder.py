@@ -72,7 +72,7 @@ class FoundBody:
     Args:
         parameters: The fit.
         hessian: J'WJ of the fit.
-        runners_up: Other explanations.
+        runners_up: Other explanations that were fitted to the end.
         evidence: Shared joints that were surely seen.
     """
 
@@ -110,4 +110,6 @@ def find_person(pipeline: BodyPipeline, scene: Scene, detection: Detection) -> F
     fit = person.fit
     return FoundPerson(
         person.status, person.estimate,
-        FoundBody(fit.parameters, fit.hessian, fit.runners_up, lifted.sure))
+        FoundBody(
+            fit.parameters, fit.hessian,
+            tuple(other.parameters for other in fit.runners_up if other.finished), lifted.sure))

@@ -66,7 +66,7 @@ def surface_terms(
     # and the filter would take that for knowledge.
     measured, of_limb = claims.weighed(join_pairs([
         match_points(state, visibility, points, labels, scale_m, observation.noise),
-        match_vertices(state, visibility, scale_m, observation.noise)]))
+        match_vertices(state, visibility, observation, scale_m)]))
     measured, spread = merged_pairs(measured)
     parts = [measured]
     if config.free_space:

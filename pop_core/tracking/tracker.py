@@ -205,24 +205,25 @@ class BodyTracker:
         scene = Scene(
             frame, self._ground, self._noise, np.zeros(frame.depth_m.shape, dtype=bool))
         bodies: list[BodyEstimate] = []
+        nearer: BodyEstimate | None = None
         for row in np.argsort([t.filter.parameters.transl[2] for t in self._tracks]).tolist():
+            scene = scene if nearer is None else self.pipeline.behind(scene, nearer)
             track, glimpse = self._tracks[row], matches.get(row)
             if look is not None:
                 count_misses(track, glimpse is not None)
-            estimate = self._continue(track, scene, glimpse, expected[row], watch)
+            nearer = self._continue(track, scene, glimpse, expected[row], watch)
             if self._schedule.has_looked:
                 track.note_look()
-            if estimate is not None:
-                bodies.append(estimate)
-                scene = replace(scene, taken=scene.taken | estimate.mask)
+            if nearer is not None:
+                bodies.append(nearer)
         statuses = []
         if look is not None:
             statuses = [EstimateStatus.OK for _ in look.found.detections]
             for index in look.found.nearest_first({seen.index for seen in matches.values()}):
-                statuses[index], estimate = self._begin(scene, Glimpse(look, index), watch)
-                if estimate is not None:
-                    bodies.append(estimate)
-                    scene = replace(scene, taken=scene.taken | estimate.mask)
+                scene = scene if nearer is None else self.pipeline.behind(scene, nearer)
+                statuses[index], nearer = self._begin(scene, Glimpse(look, index), watch)
+                if nearer is not None:
+                    bodies.append(nearer)
         double = doubles(bodies)
         bodies = [body for body in bodies if body.track is None or body.track.id not in double]
         self._tracks = [

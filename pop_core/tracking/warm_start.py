@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from pop_core.estimate import RunnerUp
 from pop_core.fitting.body_fit import BodyFit, BodyFitter
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.depth_consistency import (
@@ -122,7 +123,8 @@ class WarmFit(FollowedBody):
         hessian = self.before + self.curvature.data + self.curvature.prior
         return BodyFit(
             self.state.parameters, hessian, self.visibility, self.state, self.segment,
-            self.energies, tuple(other.parameters for other in alternatives), left)
+            self.energies,
+            tuple(RunnerUp(other.parameters, 0.0, finished=True) for other in alternatives), left)
 
 
 def updated(predicted: FilterState, fit: WarmFit) -> FilterState:

@@ -24,6 +24,7 @@ from pop_core.body.kinematics import attached_positions
 from pop_core.body.model import rest_parameters, shared_points
 from pop_core.config import PipelineConfig
 from pop_core.geometry.rotation import from_rotvec, to_rotvec
+from pop_core.retrieval.retrieve import RetrievalConfig
 from pop_core.synthesis.scenes import synthesise_scene
 
 
@@ -211,11 +212,27 @@ def test_other_settings_have_another_key():
     assert first != accuracy_cache.run_key([repr(changed)])
 
 
-def test_settings_given_as_text_get_their_own_type():
-    values = accuracy.parse_settings(
-        ['retrieval.candidates=3', 'fitting.free_space=false', 'max_range_m=4'])
-    assert values == {
-        'retrieval.candidates': 3, 'fitting.free_space': False, 'max_range_m': 4.0}
+@pytest.mark.parametrize('arguments', [
+    ['--set', 'fitting.nonsense=1'], ['--set', 'retrieval.candidates=many'],
+    ['--frames', '1', '--keypoints', 'nobody.onnx']])
+def test_wrong_arguments_are_told_in_a_line(arguments, capsys):
+    assert main(['accuracy', *arguments]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith('benchmarks accuracy: ')
+    assert 'expected' in said
+
+
+def test_no_scenes_at_all_are_refused():
+    with pytest.raises(SystemExit, match='2'):
+        main(['accuracy', '--frames', '0'])
+
+
+def test_fewer_hypotheses_are_fitted_on_in_the_same_shares():
+    assert accuracy.of_k(RetrievalConfig().candidates) == {
+        'retrieval.candidates': 6, 'fitting.surface_hypotheses': 4, 'fitting.final_hypotheses': 2}
+    assert accuracy.of_k(1) == {
+        'retrieval.candidates': 1, 'fitting.surface_hypotheses': 1, 'fitting.final_hypotheses': 1}
+    assert accuracy.of_k(12)['fitting.final_hypotheses'] == 4
 
 
 def test_every_ablation_names_settings_that_exist():

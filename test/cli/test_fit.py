@@ -3,26 +3,36 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
 from cli.conftest import write_frame
+from support.estimates import CAMERA, estimate
 from typer.testing import CliRunner
 
 from pop_core.body.default_body import default_body
 from pop_core.body.kinematics import joints
 from pop_core.body.model import BodyParameters
+from pop_core.body.model_digest import model_digest
 from pop_core.body.skinning import vertices
 from pop_core.errors import PopError
+from pop_core.estimate import FrameResult, Track, TrackState
+from pop_core.retrieval.retrieve import RetrievalConfig
 from pop_ros.cli import build_app
-from pop_ros.result_folder import status_sentence
+from pop_ros.result_folder import person_arrays, result_json, status_sentence
 from pop_ros.warm_up import PLACE
 
 ARRAYS = {
     'joints': ((24, 3), 'f'), 'global_orient': ((3,), 'f'), 'body_pose': ((23, 3), 'f'),
     'transl': ((3,), 'f'), 'betas': ((10,), 'f'), 'scale': ((), 'f'), 'score': ((), 'f'),
     'joint_state': ((24,), 'i'), 'joint_covariance': ((24, 3, 3), 'f'), 'mask': ((120, 160), 'b'),
+    'joint_rotations': ((24, 3, 3), 'f'),
+}
+RUNNERS_UP = {
+    'transl': ((3,), 'f'), 'global_orient': ((3,), 'f'), 'body_pose': ((23, 3), 'f'),
+    'betas': ((10,), 'f'), 'scale': ((), 'f'), 'excess_cost': ((), 'f'), 'finished': ((), 'b'),
 }
 
 
@@ -54,7 +64,9 @@ def test_a_person_file_holds_the_promised_arrays(fitted):
     v, f = len(model.v_template), len(model.f)
     meshes = {
         'vertices': ((v, 3), 'f'), 'tpose_vertices': ((v, 3), 'f'), 'faces': ((f, 3), 'i')}
-    expected = {**ARRAYS, **meshes}
+    k = RetrievalConfig().candidates - 1
+    others = {f'runners_up_{n}': ((k, *shape), kind) for n, (shape, kind) in RUNNERS_UP.items()}
+    expected = {**ARRAYS, **meshes, **others}
     assert {k: (person[k].shape, person[k].dtype.kind) for k in person.files} == expected
     assert all(np.isfinite(person[k]).all() for k in person.files)
     assert set(np.unique(person['joint_state'])) <= set(range(5))
@@ -86,10 +98,28 @@ def test_result_json_says_what_was_found(fitted):
     assert one['status'] == '1 person fitted'
     assert [p['file'] for p in one['people']] == ['person_0.npz']
     assert 'E_depth' in one['people'][0]['energies']
+    excess = [other['excess_cost'] for other in one['people'][0]['runners_up']]
+    assert len(excess) == RetrievalConfig().candidates - 1
+    assert excess == sorted(excess)
+    assert one['body'] == {'name': 'default', 'digest': model_digest(default_body())}
+    assert one['camera']['width'] == 160
     assert one['times_ms']['fit'] > 0
     nobody = json.loads((fitted / 'deep' / 'nobody' / 'result.json').read_text())
     assert nobody['status'] == 'nobody found'
     assert nobody['people'] == []
+
+
+def test_a_person_who_is_followed_is_named():
+    model = default_body()
+    track = Track(7, TrackState.PREDICTED, 3.0, 0.5, np.full(24, 0.5))
+    body = replace(estimate(model), track=track)
+    arrays = person_arrays(body, model)
+    assert (arrays['track_id'], arrays['track_state']) == (7, TrackState.PREDICTED)
+    assert arrays['joint_unseen_s'].shape == (24,)
+    content = result_json(FrameResult((body,), (), {}), model, CAMERA)
+    assert content['people'][0]['track'] == {'id': 7, 'state': 'predicted'}
+    assert 'track' not in result_json(
+        FrameResult((estimate(model),), (), {}), model, CAMERA)['people'][0]
 
 
 def test_the_overlay_shows_four_panels(fitted):

@@ -5,10 +5,11 @@ import pytest
 
 from pop_core.body.default_body import default_body
 from pop_core.config import PipelineConfig
+from pop_core.depth_noise import USUAL_NOISE
 from pop_core.estimate import EstimateStatus, FrameResult, JointState
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.region import RegionConfig
-from pop_core.pipeline import BodyPipeline
+from pop_core.pipeline import BodyPipeline, Scene
 from pop_core.retrieval.default_library import default_library
 from pop_core.rgbd import RgbdFrame
 from pop_core.synthesis.scene_config import SceneConfig
@@ -59,6 +60,26 @@ def test_masks_lie_on_the_people(scene: SyntheticScene, result: FrameResult) -> 
     people = np.any([p.mask for p in scene.people], axis=0)
     found = np.any([b.mask for b in result.bodies], axis=0)
     assert (found & people).sum() / found.sum() > 0.9
+
+
+def test_a_nearer_person_hides_others_also_in_holes_of_depth(
+    scene: SyntheticScene, result: FrameResult
+) -> None:
+    nearer, depth_m = result.bodies[0], scene.frame.depth_m.copy()
+    holes = nearer.mask & (np.random.default_rng(0).random(depth_m.shape) < 0.2)
+    depth_m[holes] = np.nan
+    seen = Scene(
+        RgbdFrame(scene.frame.rgb, depth_m, scene.frame.camera), None, USUAL_NOISE,
+        np.zeros(depth_m.shape, dtype=bool))
+    pipeline = BodyPipeline(default_body(), default_library(), Given([]))
+    behind = pipeline.behind(seen, nearer)
+    np.testing.assert_array_equal(behind.taken, nearer.mask)
+    filled = holes & np.isfinite(behind.frame.depth_m)
+    assert filled.sum() > 0.8 * holes.sum()
+    off_m = np.abs(behind.frame.depth_m[filled] - scene.true_depth_m[filled])
+    assert np.median(off_m) < 0.03
+    there = ~np.isnan(depth_m) | ~nearer.mask
+    np.testing.assert_array_equal(behind.frame.depth_m[there], depth_m[there])
 
 
 def test_hidden_joints_are_called_hidden(scene: SyntheticScene, result: FrameResult) -> None:

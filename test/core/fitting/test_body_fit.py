@@ -102,7 +102,12 @@ def test_runners_up_are_reported(
 ) -> None:
     start = [disturbed(person, seed, 0.15) for seed in range(3)]
     result = fit(fitter, photograph(body, person), lift_truth(body, person), start)
-    assert len(result.runners_up) == fitter.config.final_hypotheses - 1
+    others = result.runners_up
+    assert len(others) == len(start) - 1
+    assert sum(other.finished for other in others) == fitter.config.final_hypotheses - 1
+    excess = [other.excess_cost for other in others]
+    assert excess == sorted(excess)
+    assert all(other.excess_cost >= 0 for other in others if other.finished)
     assert set(result.energies) == {'E_J3D', 'E_prior', 'E_NN', 'E_depth'}
 
 

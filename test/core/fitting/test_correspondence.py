@@ -1,5 +1,7 @@
 """Pairs of measured points and vertices: at the true body, nothing pulls it in or out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.one_person import CAMERA, WALL_M, lift_truth
@@ -9,7 +11,9 @@ from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.depth_noise import BASE_M, DepthNoise
 from pop_core.fitting.body_state import CLOTH_M, HAIR_M, BodyState, FitBody
 from pop_core.fitting.correspondence import (
+    NEAR_PARTS,
     match_points,
+    match_vertices,
     nearest_as_sensors_err,
     tangential_pairs,
     thin_points,
@@ -98,6 +102,19 @@ def test_hands_and_faces_are_bare_and_crowns_have_hair(state: BodyState) -> None
     assert depth_m[state.vertices[:, 1].argmin()] == pytest.approx(HAIR_M)  # y points down
     chest = state.body.main_bone == JOINT_INDEX['spine3']
     np.testing.assert_allclose(depth_m[chest], CLOTH_M, atol=1e-12)
+
+
+def test_vertices_are_not_drawn_to_points_of_another_part(state: BodyState) -> None:
+    """Where the detector calls an arm's pixels a leg, the arm's vertices take no point there."""
+    observation = seen_with_noise(state, 0.0)
+    visibility = see_body(state, observation)
+    labels = np.full(observation.depth_m.shape, JOINT_INDEX['left_knee'])
+    named = match_vertices(state, visibility, replace(observation, labels=labels), SCALE_M)
+    legs = NEAR_PARTS[JOINT_INDEX['left_knee'], state.body.main_bone[named.vertex]]
+    assert 0 < legs.sum() < len(legs)
+    unnamed = match_vertices(state, visibility, observation, SCALE_M)
+    assert (unnamed.weight[~legs] > 0).any()
+    np.testing.assert_array_equal(named.weight, unnamed.weight * legs)
 
 
 def test_point_to_point_pulls_along_every_axis_with_a_third_of_the_points(

@@ -1,6 +1,7 @@
 """The network learns, goes on where it stopped, and means the same as ONNX."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,8 +11,12 @@ from pop_core.training.shards import ShardError, pack, save_shard
 
 torch = pytest.importorskip('torch')
 
-from pop_core.keypoints.depth_network import DepthNetwork  # noqa: E402 - torch first
-from pop_core.training.export import export_onnx  # noqa: E402
+from pop_core.keypoints.depth_network import (  # noqa: E402 - torch first
+    EMBEDDED,
+    DepthNetwork,
+    close_path,
+)
+from pop_core.training.export import export_onnx, largest_difference  # noqa: E402
 from pop_core.training.losses import losses  # noqa: E402
 from pop_core.training.muon import orthogonal  # noqa: E402
 from pop_core.training.network import (  # noqa: E402
@@ -33,6 +38,7 @@ from pop_core.training.trainer import (  # noqa: E402
 )
 from pop_core.training.validation import MapScores  # noqa: E402
 
+ROOT = Path(__file__).parents[3]
 TINY = NetworkConfig(
     widths=(4, 8, 8, 12, 12), blocks=(1, 1, 1, 1), pyramid=16, focal_px=80.0)
 SIZE = (96, 64)
@@ -158,6 +164,22 @@ def test_weights_in_half_precision_are_small_and_say_nearly_the_same(batch, tmp_
 
 
 @pytest.mark.parametrize('size', [(64, 96), (160, 192)], ids=str)
+@pytest.mark.parametrize('name', ['small', 'close'])
+def test_the_shipped_networks_are_their_weights(name):
+    """What is trained on from the committed weights is what users run."""
+    weights = ROOT / f'pop_core/training/depth_net_{name}.pt'
+    shipped = EMBEDDED if name == 'small' else close_path(EMBEDDED)
+    assert largest_difference(load_network(weights), shipped) < 1e-3
+
+
+def test_a_file_that_says_something_else_is_found_out(tmp_path):
+    torch.manual_seed(1)
+    network, other = DepthNet(TINY).eval(), DepthNet(TINY).eval()
+    export_onnx(network, tmp_path / 'net.onnx')
+    assert largest_difference(network, tmp_path / 'net.onnx') < 1e-3
+    assert largest_difference(other, tmp_path / 'net.onnx') > 1e-2
+
+
 def test_onnx_says_what_torch_says(size, tmp_path, batch):
     learner = trainer()
     for _ in range(3):
