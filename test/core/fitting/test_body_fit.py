@@ -9,15 +9,18 @@ from support.one_person import CAMERA, lift_truth, photograph
 from pop_core.body.joints import JOINT_INDEX, SHARED_INDEX
 from pop_core.body.kinematics import attached_positions, joints
 from pop_core.body.model import BodyModel, BodyParameters, shared_points
+from pop_core.body.skinning import vertices
 from pop_core.fitting.body_fit import BodyFit, BodyFitter
 from pop_core.fitting.body_state import FitBody
 from pop_core.fitting.calibration import SINGLE_FRAME
 from pop_core.fitting.correspondence import match_points
-from pop_core.fitting.depth_consistency import see_body
+from pop_core.fitting.depth_consistency import free_space_violation, see_body
+from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.fitting.observation import observe
 from pop_core.fitting.uncertainty import joint_covariance
 from pop_core.geometry.rotation import from_rotvec
 from pop_core.keypoints.lifted_joints import LiftedJoints
+from pop_core.rendering.depth_renderer import render_depth
 from pop_core.retrieval.candidate import PoseCandidate
 from pop_core.retrieval.pose_prior import load_pose_prior
 from pop_core.rgbd import RgbdFrame
@@ -109,6 +112,31 @@ def test_runners_up_are_reported(
     assert excess == sorted(excess)
     assert all(other.excess_cost >= 0 for other in others if other.finished)
     assert set(result.energies) == {'E_J3D', 'E_prior', 'E_NN', 'E_depth'}
+
+
+def test_space_that_the_sensor_saw_through_sends_an_arm_behind_the_pillar(
+    body: BodyModel, person: BodyParameters
+) -> None:
+    """Retrieved arms stand beside the pillar, where the wall is seen; no keypoint names them."""
+    arm = [SHARED_INDEX[name] for name in ('left_shoulder', 'left_elbow', 'left_wrist')]
+    p = CAMERA.project(attached_positions(shared_points(body), body, person)[arm])
+    (left, top), (right, _) = p.min(axis=0), p.max(axis=0)
+    frame = photograph(body, person)
+    depth_m = frame.depth_m.copy()
+    depth_m[int(top) - 6:, int(left) - 2: int(right) + 14] = 1.8
+    hidden = RgbdFrame(frame.rgb, depth_m, CAMERA)
+    lifted = lift_truth(body, person, tuple(arm[1:]))
+    violation = {True: 0.0, False: 0.0}
+    for raised_rad in (-0.6, -0.3, 0.0, 0.4):
+        pose = person.body_pose.copy()
+        pose[JOINT_INDEX['left_shoulder'] - 1, 2] = raised_rad
+        for free_space in violation:
+            config = FittingConfig(free_space=free_space, limb_searches=0)
+            fitter = BodyFitter(body, load_pose_prior(), config)
+            found = fit(fitter, hidden, lifted, [person.replaced(body_pose=pose)])
+            mesh = render_depth(vertices(body, found.parameters), body.f, CAMERA)
+            violation[free_space] += free_space_violation(mesh, depth_m)
+    assert violation[True] < 0.5 * violation[False]
 
 
 def test_an_arm_that_stands_clear_is_found_though_its_keypoints_lie_on_the_other(
