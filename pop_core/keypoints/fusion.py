@@ -1,7 +1,9 @@
 """Merge the people that several sources found in one image; each may find whom others miss.
 
 Detections of one person are told by keypoint similarity. Where sources agree on a joint, their
-places are averaged by precision; where they do not, the most confident one is believed.
+places are averaged by precision; where they do not, the most confident one is believed. Sources
+that see colour know limbs to some pixels, those that see depth alone to some centimetres: the
+latter have a say about joints that no other names, and whether guessed ones are seen at all.
 """
 
 from __future__ import annotations
@@ -23,6 +25,8 @@ from pop_core.keypoints.keypoint_similarity import (
 from pop_core.keypoints.people import detection_of
 from pop_core.rgbd import RgbdFrame
 from pop_core.settings import setting
+
+COARSE_M = 0.02  # error of a keypoint in colour of somebody some metres away
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +124,9 @@ def merge(members: Sequence[Detection], same_joint: float) -> Detection:
         return members[0]
     uv = np.stack([member.keypoints_px for member in members])
     scores = np.stack([member.scores for member in members])
+    coarse = np.stack([_is_coarse(member) for member in members])
+    named = (np.where(coarse, 0.0, scores) > 0).any(axis=0)
+    scores = np.where(coarse & named, 0.0, scores)
     surest = scores.argmax(axis=0)
     leader = uv[surest, np.arange(uv.shape[1])]
     size_px = common_size_px(members)
@@ -132,10 +139,19 @@ def merge(members: Sequence[Detection], same_joint: float) -> Detection:
     depth_m, sigma_m = _depths(members, agree)
     best = members[0]
     return replace(
-        merged, joint_depth_m=depth_m, joint_sigma_m=sigma_m, visible=_visible(members, agree),
+        merged, joint_depth_m=depth_m, joint_sigma_m=sigma_m,
+        visible=_visible(members, agree, np.where(named, merged.scores, 0.0)),
         person_mask=next((m.person_mask for m in members if m.person_mask is not None), None),
         part_labels=next((m.part_labels for m in members if m.part_labels is not None), None),
         box_px=_around(best.box_px, merged.box_px))
+
+
+def _is_coarse(member: Detection) -> Bool[np.ndarray, 's']:
+    """Return which joints a source knows less well than a keypoint in colour is worth."""
+    if member.joint_sigma_m is None:
+        return np.zeros(len(member.scores), dtype=bool)
+    with np.errstate(invalid='ignore'):
+        return np.asarray(member.joint_sigma_m > COARSE_M)
 
 
 def _depths(
@@ -159,9 +175,15 @@ def _depths(
 
 
 def _visible(
-    members: Sequence[Detection], agree: Bool[np.ndarray, 'm s']
+    members: Sequence[Detection], agree: Bool[np.ndarray, 'm s'], at_least: Float[np.ndarray, 's']
 ) -> Float[np.ndarray, 's'] | None:
-    """Return the mean probability of being seen, by members whose place is believed."""
+    """Return the mean probability of being seen, by members whose place is believed.
+
+    Args:
+        members: Detections of one person.
+        agree: Whose places are believed.
+        at_least: Confidence of a source that sees colour: it is sure of what it sees.
+    """
     known = [(m.visible, rows) for m, rows in zip(members, agree, strict=True)
              if m.visible is not None]
     if not known:
@@ -170,7 +192,7 @@ def _visible(
     weight = np.stack([rows for _, rows in known]).astype(np.float64)
     # Where nobody who can say is believed, the most confident one's word is taken.
     weight[0] += weight.sum(axis=0) == 0
-    return (weight * said).sum(axis=0) / weight.sum(axis=0)
+    return np.maximum((weight * said).sum(axis=0) / weight.sum(axis=0), at_least)
 
 
 def _around(a: Float[np.ndarray, '4'], b: Float[np.ndarray, '4']) -> Float[np.ndarray, '4']:

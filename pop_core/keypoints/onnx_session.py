@@ -129,14 +129,18 @@ def _load(content: bytes, where: str) -> onnxruntime.InferenceSession:
     # A file of 100 bytes may ask for a constant of gigabytes, computed while it is loaded.
     options.add_session_config_entry(
         'optimization.constant_folding_max_output_size_in_bytes', str(FOLDING_BYTES))
-    there = onnxruntime.get_available_providers()
-    providers = [name for name in PROVIDERS if name in there]
+    providers = chosen_providers(onnxruntime.get_available_providers())
     try:
         # From memory a network cannot name other files as its weights.
         return onnxruntime.InferenceSession(content, options, providers=providers)
     except Exception as error:  # noqa: BLE001 - ONNX Runtime's errors share no public base
         raise NetworkShapeError(
             f'{where}: expected an ONNX network, found: {one_line(error)}') from None
+
+
+def chosen_providers(there: Sequence[str]) -> list[str]:
+    """Return the execution providers to use, fastest first, of those that are there."""
+    return [name for name in PROVIDERS if name in there]
 
 
 def one_line(said: object) -> str:

@@ -24,6 +24,27 @@ def test_scenes_are_written_one_folder_each(tmp_path):
     assert files == {'color.png', 'depth.png', 'camera.json', 'keypoints.json', 'truth.npz'}
 
 
+def test_scenes_are_drawn_with_the_sensor_that_was_asked_for(tmp_path):
+    depths = []
+    for sensor in ('perfect', 'stereo'):
+        out = tmp_path / sensor
+        result = invoke('--count', 1, '--seed', 30, '--sensor', sensor, '--out', out)
+        assert result.exit_code == 0, result.output
+        depths.append(cv2.imread(str(out / 'scene_000030' / 'depth.png'), cv2.IMREAD_UNCHANGED))
+    holes = [(depth == 0).mean() for depth in depths]
+    assert holes[0] < holes[1]
+
+
+def test_the_wide_set_holds_empty_rooms_and_crowds(tmp_path):
+    result = invoke('--count', 6, '--seed', 30, '--wide', '--sensor', 'perfect', '--out', tmp_path)
+    assert result.exit_code == 0, result.output
+    people = [len(np.load(path)['joints']) for path in tmp_path.glob('*/truth.npz')]
+    assert len(people) == 6
+    assert max(people) > 3
+    refused = invoke('--wide', '--sequence', 'camera', '--out', tmp_path / 'film')
+    assert refused.exit_code == 2
+
+
 @pytest.fixture(scope='module')
 def recording(tmp_path_factory):
     folder = tmp_path_factory.mktemp('synth')

@@ -199,21 +199,43 @@ def with_depth(detection, depth_m, sigma_m):
 
 
 def test_what_only_a_depth_source_knows_is_kept():
-    seen = with_depth(person(0, 0.5), 2.5, 0.03)
+    seen = with_depth(person(0, 0.5), 2.5, 0.01)
     (fused,) = fuse([[person(2, 0.9)], [seen]])
     np.testing.assert_allclose(fused.joint_depth_m, 2.5)
-    np.testing.assert_allclose(fused.joint_sigma_m, 0.03)
+    np.testing.assert_allclose(fused.joint_sigma_m, 0.01)
     np.testing.assert_allclose(fused.visible, 0.9)
     assert fused.person_mask is seen.person_mask
     assert fused.part_labels is seen.part_labels
 
 
 def test_depth_of_a_place_that_is_not_believed_is_not_believed():
-    seen = with_depth(person(0, 0.5), 2.5, 0.03)
+    seen = with_depth(person(0, 0.5), 2.5, 0.01)
     seen.keypoints_px[WRIST] += [150, 0]
     (fused,) = fuse([[person(0, 0.9)], [seen]])
     assert np.isnan(fused.joint_depth_m[WRIST])
     assert np.isfinite(np.delete(fused.joint_depth_m, WRIST)).all()
+
+
+def test_a_coarse_source_has_a_say_where_no_other_names_a_joint():
+    """A network of depth alone knows limbs to some centimetres: it would only add its errors."""
+    exact = person(0, 0.8)
+    exact.keypoints_px[WRIST], exact.scores[WRIST] = np.nan, 0.0
+    coarse = with_depth(person(3, 0.9), 2.5, 0.08)
+    (fused,) = fuse([[exact], [coarse]])
+    others = np.delete(np.arange(15), WRIST)
+    np.testing.assert_allclose(fused.keypoints_px[others], exact.keypoints_px[others])
+    np.testing.assert_allclose(fused.keypoints_px[WRIST], coarse.keypoints_px[WRIST])
+    assert np.isnan(fused.joint_depth_m[others]).all()
+    assert fused.joint_depth_m[WRIST] == 2.5
+
+
+def test_a_joint_that_is_guessed_in_colour_is_hidden_where_depth_says_so():
+    colour = person(0, 0.9)
+    colour.scores[WRIST] = 0.3
+    hidden = replace(with_depth(person(0, 0.5), 2.5, 0.08), visible=np.full(15, 0.1))
+    (fused,) = fuse([[colour], [hidden]])
+    assert fused.visible[WRIST] == 0.3
+    np.testing.assert_array_equal(np.delete(fused.visible, WRIST), 0.9)
 
 
 def test_two_depths_are_averaged_by_precision():

@@ -10,7 +10,12 @@ from onnx import helper, numpy_helper
 from support.onnx_files import KINDS, save_graph, save_network
 
 from pop_core.errors import NetworkShapeError
-from pop_core.keypoints.onnx_session import OnnxSession, load_network, read_network
+from pop_core.keypoints.onnx_session import (
+    OnnxSession,
+    chosen_providers,
+    load_network,
+    read_network,
+)
 
 SMALL = (1, 3, 4, 4)
 
@@ -47,6 +52,16 @@ def test_a_network_gives_its_outputs(tmp_path):
     image = np.random.default_rng(0).random(SMALL).astype(np.float32)
     np.testing.assert_allclose(session.run(image)[0], 2 * image)
     assert str(session.spec) == 'image (1, 3, 4, 4) float32 -> out (1, 3, 4, 4) float32'
+
+
+@pytest.mark.parametrize(('there', 'chosen'), [
+    (['CPUExecutionProvider'], ['CPUExecutionProvider']),
+    (['TensorrtExecutionProvider', 'CUDAExecutionProvider', 'CPUExecutionProvider'],
+     ['CUDAExecutionProvider', 'CPUExecutionProvider']),
+    (['CPUExecutionProvider', 'CUDAExecutionProvider', 'AzureExecutionProvider'],
+     ['CUDAExecutionProvider', 'CPUExecutionProvider'])], ids=str)
+def test_a_gpu_is_used_where_there_is_one(there, chosen):
+    assert chosen_providers(there) == chosen
 
 
 def test_half_floats_go_in_and_come_out_as_floats(tmp_path):
