@@ -3,7 +3,8 @@
 Detections of one person are told by keypoint similarity. Where sources agree on a joint, their
 places are averaged by precision; where they do not, the most confident one is believed. Sources
 that see colour know limbs to some pixels, those that see depth alone to some centimetres: the
-latter have a say about joints that no other names, and whether guessed ones are seen at all.
+latter have a say about joints that they see and no other names, and whether guessed ones are seen
+at all.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from pop_core.rgbd import RgbdFrame
 from pop_core.settings import setting
 
 COARSE_M = 0.02  # error of a keypoint in colour of somebody some metres away
+SEEN = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,10 +125,7 @@ def merge(members: Sequence[Detection], same_joint: float) -> Detection:
     if len(members) == 1:
         return members[0]
     uv = np.stack([member.keypoints_px for member in members])
-    scores = np.stack([member.scores for member in members])
-    coarse = np.stack([_is_coarse(member) for member in members])
-    named = (np.where(coarse, 0.0, scores) > 0).any(axis=0)
-    scores = np.where(coarse & named, 0.0, scores)
+    scores, named = _confidences(members)
     surest = scores.argmax(axis=0)
     leader = uv[surest, np.arange(uv.shape[1])]
     size_px = common_size_px(members)
@@ -142,8 +141,28 @@ def merge(members: Sequence[Detection], same_joint: float) -> Detection:
         merged, joint_depth_m=depth_m, joint_sigma_m=sigma_m,
         visible=_visible(members, agree, np.where(named, merged.scores, 0.0)),
         person_mask=next((m.person_mask for m in members if m.person_mask is not None), None),
-        part_labels=next((m.part_labels for m in members if m.part_labels is not None), None),
+        # Keypoints in colour tell limbs apart better than parts seen in depth.
+        part_labels=None if named.any() else next(
+            (m.part_labels for m in members if m.part_labels is not None), None),
         box_px=_around(best.box_px, merged.box_px))
+
+
+def _confidences(
+    members: Sequence[Detection]
+) -> tuple[Float[np.ndarray, 'm s'], Bool[np.ndarray, 's']]:
+    """Return each source's confidence in each joint, 0 where it has no say, and who is named.
+
+    Named are joints that a source knows exactly. A coarse source has no say there; nor, beside
+    exact ones, about joints that it does not see itself: what poses people take tells as much.
+    """
+    scores = np.stack([member.scores for member in members])
+    coarse = np.stack([_is_coarse(member) for member in members])
+    named = ((scores > 0) & ~coarse).any(axis=0)
+    unseen = np.stack([
+        np.zeros(len(member.scores), dtype=bool) if member.visible is None
+        else member.visible < SEEN for member in members])
+    silent = coarse & (named | (unseen & named.any()))
+    return np.where(silent, 0.0, scores), named
 
 
 def _is_coarse(member: Detection) -> Bool[np.ndarray, 's']:

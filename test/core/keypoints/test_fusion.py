@@ -205,7 +205,6 @@ def test_what_only_a_depth_source_knows_is_kept():
     np.testing.assert_allclose(fused.joint_sigma_m, 0.01)
     np.testing.assert_allclose(fused.visible, 0.9)
     assert fused.person_mask is seen.person_mask
-    assert fused.part_labels is seen.part_labels
 
 
 def test_depth_of_a_place_that_is_not_believed_is_not_believed():
@@ -227,6 +226,14 @@ def test_a_coarse_source_has_a_say_where_no_other_names_a_joint():
     np.testing.assert_allclose(fused.keypoints_px[WRIST], coarse.keypoints_px[WRIST])
     assert np.isnan(fused.joint_depth_m[others]).all()
     assert fused.joint_depth_m[WRIST] == 2.5
+    assert fused.person_mask is coarse.person_mask
+    assert fused.part_labels is None
+    unseen = replace(coarse, visible=np.full(15, 0.2))
+    (fused,) = fuse([[exact], [unseen]])
+    assert np.isnan(fused.keypoints_px[WRIST]).all()
+    (alone,) = fuse([[], [unseen]])
+    assert np.isfinite(alone.keypoints_px).all()
+    assert alone.part_labels is unseen.part_labels
 
 
 def test_a_joint_that_is_guessed_in_colour_is_hidden_where_depth_says_so():
