@@ -39,6 +39,7 @@ from pop_core.body.model import BodyModel
 from pop_core.config import PipelineConfig
 from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.keypoints.detection import KeypointDetector
+from pop_core.keypoints.fusion import FusedDetector
 from pop_core.pipeline import BodyPipeline
 from pop_core.retrieval.default_library import default_library
 from pop_core.retrieval.pose_library import PoseLibrary
@@ -46,10 +47,13 @@ from pop_core.retrieval.retrieve import RetrievalConfig
 from pop_core.settings import Value, apply_settings
 from pop_core.synthesis.scene_config import SceneConfig
 from pop_core.synthesis.scenes import SyntheticScene, synthesise_scene
+from pop_ros.keypoint_sources import apply_settings as apply_to_source
+from pop_ros.keypoint_sources import make_detector
 from pop_ros.settings_flags import with_flags
 
 FIRST_SEED = 10_000  # far from the seeds of tests and training
 MAIN = 'pop'
+TRUTH = 'truth'  # the scenes' own keypoints, with the errors of a good network in colour
 
 
 def of_k(k: int) -> dict[str, Value]:
@@ -105,7 +109,8 @@ def parse(argv: list[str]) -> argparse.Namespace:
     parser.add_argument('--json', type=Path, help='file to write all figures into')
     parser.add_argument('--pictures', type=Path, help='folder for curves and error heat maps')
     parser.add_argument(
-        '--keypoints', default='truth', help="'truth' (with noise), or a source as in `pop fit`")
+        '--keypoints', default=TRUTH, metavar='SOURCE',
+        help="'truth' (with noise), sources as in `pop fit`, or both: 'truth,depth'")
     parser.add_argument('--ablations', action='store_true', help='run the variants too')
     parser.add_argument('--no-baselines', action='store_true', help='only the pipeline')
     parser.add_argument(
@@ -119,13 +124,7 @@ def make_methods(
 ) -> dict[str, Method]:
     """Return what is compared, the pipeline first."""
     model = default_body()
-    source: KeypointDetector = detector
-    if options.keypoints != 'truth':
-        from pop_ros import keypoint_sources
-        from pop_ros.sources import make_detector
-
-        source = make_detector(options.keypoints)
-        keypoint_sources.apply_settings(source, config)
+    source = make_source(options.keypoints, detector, config)
     pipeline = BodyPipeline(model, library, source, config)
     methods: dict[str, Method] = {MAIN: Pipeline(pipeline)}
     if not options.no_baselines:
@@ -135,6 +134,23 @@ def make_methods(
             variant = BodyPipeline(model, library, source, apply_settings(config, changes))
             methods[name] = Pipeline(variant)
     return methods
+
+
+def make_source(
+    keypoints: str, given: GivenDetections, config: PipelineConfig
+) -> KeypointDetector:
+    """Return the keypoint source: what is given, what `pop fit` would use, or both merged.
+
+    Raises:
+        PopError: If there is no such source.
+    """
+    named = keypoints.split(',')
+    others = ','.join(name for name in named if name != TRUTH)
+    if not others:
+        return given
+    source = make_detector(others)
+    apply_to_source(source, config)
+    return FusedDetector([given, source], config=config.fusion) if TRUTH in named else source
 
 
 def measure(
