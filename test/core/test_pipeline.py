@@ -1,12 +1,16 @@
 """From keypoints and depth to bodies, on a synthetic scene and at its edges."""
 
+from typing import Any
+
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from pop_core.body.default_body import default_body
 from pop_core.config import PipelineConfig
 from pop_core.depth_noise import USUAL_NOISE
 from pop_core.estimate import EstimateStatus, FrameResult, JointState
+from pop_core.fitting.body_fit import BodyFit, BodyFitter
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.region import RegionConfig
 from pop_core.pipeline import BodyPipeline, Scene
@@ -106,6 +110,26 @@ def test_backs_taken_for_fronts_give_the_same_bodies(
     for body in result.bodies:
         off = [np.linalg.norm(other.joints - body.joints, axis=1).mean() for other in found.bodies]
         assert min(off) < 0.06
+
+
+def test_while_people_are_fitted_products_have_one_thread(
+    scene: SyntheticScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def threads() -> set[int]:
+        return {info['num_threads'] for info in threadpool_info() if info['user_api'] == 'blas'}
+
+    during, fit = [], BodyFitter.fit
+
+    def watched(self: BodyFitter, *arguments: Any) -> BodyFit:
+        during.append(threads())
+        return fit(self, *arguments)
+
+    monkeypatch.setattr(BodyFitter, 'fit', watched)
+    with threadpool_limits(2, 'blas'):
+        run(scene.frame, [d for d in scene.detections() if d is not None])
+        assert threads() == {2}
+    assert during
+    assert all(each == {1} for each in during)
 
 
 def test_nobody_detected_is_an_empty_result(scene: SyntheticScene) -> None:

@@ -28,6 +28,13 @@ def simcc(tensor, count=17, ratio=2, score=0.7):
     return [columns, rows]
 
 
+def spotted_tensor(shape):
+    """An input with its spot in the middle."""
+    tensor = np.zeros(shape, np.float32)
+    tensor[..., shape[2] // 2, shape[3] // 2] = 1.0
+    return tensor
+
+
 @pytest.mark.parametrize('count', [17, 26, 133])
 @pytest.mark.parametrize('rows_first', [False, True])
 def test_what_is_seen_in_a_box_comes_back_where_it_is_in_the_image(count, rows_first):
@@ -44,6 +51,25 @@ def test_what_is_seen_in_a_box_comes_back_where_it_is_in_the_image(count, rows_f
     # 1.6 pixels of the image per pixel of the input, bins of half a pixel.
     np.testing.assert_allclose(uv, np.tile(place, (14, 1)), atol=0.8)
     np.testing.assert_allclose(person.scores, 0.7, atol=1e-6)  # the less certain axis
+
+
+def test_the_network_sees_red_green_blue_as_imagenet_was_normalised():
+    """Jiang et al. 2023: (RGB - mean) / deviation; black around the image is that of bytes."""
+    seen = []
+
+    def run(tensor):
+        seen.append(tensor)
+        return simcc(spotted_tensor(tensor.shape))
+
+    image = np.zeros((400, 300, 3), np.uint8)
+    image[:] = (255, 128, 0)
+    choose_decoder(spec_of(), None, 'net.onnx').detect_in(
+        image, [PersonBox(np.array([50.0, 50.0, 250.0, 350.0]), 0.9)], run)
+    (tensor,) = seen
+    assert tensor.shape == (1, 3, 256, 192)
+    mean, deviation = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)
+    wanted = [(c - m) / d for c, m, d in zip((255, 128, 0), mean, deviation, strict=True)]
+    np.testing.assert_allclose(tensor[0, :, 128, 96], wanted, atol=0.02)
 
 
 def test_every_box_is_one_person():
