@@ -33,6 +33,10 @@ class KeypointFileError(PopError):
     """A keypoint file that does not hold people in the expected format."""
 
 
+class DetectionError(PopError):
+    """Keypoints of a source that are not those of a person, by number or shape."""
+
+
 class NetworkShapeError(PopError):
     """A network whose inputs or outputs do not fit its decoder."""
 
