@@ -41,7 +41,7 @@ def family_arrays(joints: int, shapes: int, features: int, seed: int = 0) -> dic
     regressor[:, 0] += 0.1
     parents = np.array(family_parents(joints), dtype=np.int64)
     return {
-        'v_template': rng.normal(size=(N_VERTICES, 3)),
+        'v_template': rng.uniform(-0.9, 0.9, size=(N_VERTICES, 3)),  # metres
         'shapedirs': 0.01 * rng.normal(size=(N_VERTICES, 3, shapes)),
         'posedirs': 0.01 * rng.normal(size=(N_VERTICES, 3, features)),
         'weights': weights / weights.sum(axis=1, keepdims=True),
