@@ -21,8 +21,8 @@ Progress = Callable[[float, str], None]
 def make_pipeline(
     detector: KeypointDetector,
     config: PipelineConfig | None = None,
-    body_file: Path | None = None,
-    library_file: Path | None = None,
+    body_file: str | Path | None = None,
+    library_file: str | Path | None = None,
     progress: Progress | None = None,
 ) -> BodyPipeline:
     """Return a pipeline with its body model and pose library loaded and its kernels compiled.

@@ -49,6 +49,11 @@ def test_one_network_is_itself(networks):
     assert 'read as rtmo' in reasons(detector)[0]
 
 
+def test_files_and_folders_may_be_named_by_text_and_by_path(networks, tmp_path):
+    assert isinstance(make_detector(Path(networks['people'])), OnnxKeypointDetector)
+    assert make_detector('json', str(tmp_path)).folder == tmp_path
+
+
 def test_sources_of_all_kinds_find_their_part(networks):
     detector = make_detector(','.join(networks[k] for k in ('top_down', 'people', 'boxes')))
     assert isinstance(detector, FusedDetector)

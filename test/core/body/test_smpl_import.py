@@ -246,6 +246,32 @@ def test_pickled_arrays_in_an_npz_are_refused(
         import_body_model(_npz(tmp_path / 'm.npz', smpl))
 
 
+@pytest.mark.parametrize(('per_metre', 'unit'), [
+    (3.281, 'feet'), (39.37, 'inches'), (100.0, 'centimetres'), (1000.0, 'millimetres')])
+def test_a_body_that_is_not_in_metres_is_refused_with_its_unit(
+    tmp_path: Path, smpl: dict[str, np.ndarray], per_metre: float, unit: str
+) -> None:
+    smpl['v_template'] *= per_metre
+    with pytest.raises(ModelFileError, match=rf'm\.npz: .*in metres .*would be {unit}$'):
+        import_body_model(_npz(tmp_path / 'm.npz', smpl))
+
+
+@pytest.mark.parametrize('factor', [0.1, 3.6e5])
+def test_a_body_of_no_unit_is_refused(
+    tmp_path: Path, smpl: dict[str, np.ndarray], factor: float
+) -> None:
+    smpl['v_template'] *= factor
+    with pytest.raises(ModelFileError, match=r'0\.4 to 2\.5 m tall, found one of [\d.e+]+$'):
+        import_body_model(_npz(tmp_path / 'm.npz', smpl))
+
+
+def test_a_file_may_be_named_by_text(tmp_path: Path, smpl: dict[str, np.ndarray]) -> None:
+    path = _npz(tmp_path / 'm.npz', smpl)
+    model = import_body_model(str(path))
+    save_body_model(str(tmp_path / 'copy.npz'), model, ModelNotes('theirs', 'here'))
+    assert load_body_model(str(tmp_path / 'copy.npz')).name == 'm'
+
+
 def test_another_suffix_and_a_missing_file_are_named(tmp_path: Path) -> None:
     with pytest.raises(ModelFileError, match=r"\.pkl or \.npz file, found '\.fbx'"):
         import_body_model(tmp_path / 'm.fbx')
