@@ -12,6 +12,7 @@ import pytest
 from support.smpl_files import slow_skinning
 
 from pop_core import errors
+from pop_core.body import smpl_import
 from pop_core.body.default_body import default_body
 from pop_core.body.joints import COCO_17_NAMES, PARENTS, SHARED_INDEX
 from pop_core.estimate import BodyEstimate
@@ -101,6 +102,9 @@ def space(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
         patch.chdir(folder)
         patch.setitem(sys.modules, 'torch', stand_in_torch())
         patch.setitem(sys.modules, 'smplx', stand_in_smplx())
+        # The coarse mesh of the same body is known, and takes seconds to find under type checks.
+        body = default_body()
+        patch.setattr(smpl_import, 'decimate', lambda *_: (body.fit_vertices, body.fit_faces))
         for number, block in enumerate(BLOCKS):
             exec(compile(block, f'docs/python.md, block {number}', 'exec'), space)
     return space
