@@ -9,6 +9,10 @@ class FrameError(PopError):
     """A colour, depth or camera record that does not fit together."""
 
 
+class RepeatedStampError(FrameError):
+    """A frame of a sequence whose stamp does not tell it from the one before."""
+
+
 class CameraError(PopError):
     """Intrinsics or distortion that no projection can be computed from."""
 
@@ -27,6 +31,10 @@ class LibraryFileError(PopError):
 
 class KeypointFileError(PopError):
     """A keypoint file that does not hold people in the expected format."""
+
+
+class DetectionError(PopError):
+    """Keypoints of a source that are not those of a person, by number or shape."""
 
 
 class NetworkShapeError(PopError):

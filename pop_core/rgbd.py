@@ -25,8 +25,8 @@ class RgbdFrame:
         stamp_ns: Time of the colour image [ns].
 
     Raises:
-        FrameError: If colour is no RGB of bytes, depth no float32, sizes differ, or any depth is
-            not NaN and not positive and finite.
+        FrameError: If colour is no RGB of bytes, depth no float32, sizes differ, any depth is
+            not NaN and not positive and finite, or the stamp is no integer.
     """
 
     rgb: UInt8[np.ndarray, 'h w 3']
@@ -55,6 +55,10 @@ class RgbdFrame:
                 'frame: expected depth in metres and NaN where nothing was measured, found '
                 f'{np.count_nonzero(no_distance)} pixels of 0, below, or infinite: '
                 'pop_core.rgbd.clean_depth makes them NaN')
+        if not isinstance(self.stamp_ns, int | np.integer):
+            raise FrameError(
+                f'frame: expected stamp_ns as an integer of nanoseconds, found {self.stamp_ns!r}: '
+                'round(1e9 * seconds) converts')
 
 
 def clean_depth(depth_m: Float32[np.ndarray, 'h w']) -> Float32[np.ndarray, 'h w']:

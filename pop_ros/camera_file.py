@@ -1,4 +1,7 @@
-"""Read `camera.json`: `width height fx fy cx cy`, perhaps `distortion_model d quarter_turns`."""
+"""Read `camera.json`: `width height fx fy cx cy`, perhaps `distortion_model d quarter_turns`.
+
+Beside a depth image, it may also say what that counts: `depth_scale`.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +16,18 @@ from pop_core.geometry.camera import Camera
 from pop_ros.json_file import load_json_object
 
 INTRINSICS = ('fx', 'fy', 'cx', 'cy')
+MILLIMETRES = 1000.0
+DEPTH_SCALES = (1.0, 1e6)  # metres and micrometres: no 16-bit image counts anything else
 
 
-def load_camera(path: Path) -> Camera:
+def load_camera(path: str | Path) -> Camera:
     """Return the camera of a `camera.json`.
 
     Raises:
         FrameError: If the file is no JSON object, or a value is missing, of another type or
             not a camera's.
     """
+    path = Path(path)
     content = load_json_object(path)
     width, height = (_integer(content, name, path) for name in ('width', 'height'))
     fx, fy, cx, cy = (_number(content.get(name), name, path) for name in INTRINSICS)
@@ -37,6 +43,24 @@ def load_camera(path: Path) -> Camera:
         return Camera(width, height, fx, fy, cx, cy, model if d.size else '', d, turns)
     except CameraError as error:
         raise FrameError(f'{path}: {error}') from None
+
+
+def load_depth_scale(path: str | Path) -> float:
+    """Return how many units of the depth images beside a `camera.json` make a metre.
+
+    Raises:
+        FrameError: If the file is no JSON object, or the value no such number.
+    """
+    path = Path(path)
+    value = load_json_object(path).get('depth_scale', MILLIMETRES)
+    scale = _number(value, 'depth_scale', path)
+    low, high = DEPTH_SCALES
+    if low <= scale <= high:
+        return scale
+    inverse = f': {1.0 / scale:g}, where that is metres per unit' if 0.0 < scale < low else ''
+    raise FrameError(
+        f'{path}: expected depth_scale as units per metre, {low:g} to {high:g} (1000 for '
+        f'millimetres), found {scale:g}{inverse}')
 
 
 def camera_json(camera: Camera) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from pop_core.errors import FrameError
 from pop_core.rgbd import RgbdFrame
-from pop_ros.camera_file import load_camera
+from pop_ros.camera_file import load_camera, load_depth_scale
 from pop_ros.png_file import load_depth_png, load_rgb_png
 
 IMAGES = ('color.png', 'depth.png')
@@ -35,12 +35,13 @@ class FrameFolder:
         return self.path / 'keypoints.json'
 
 
-def find_frames(root: Path) -> list[FrameFolder]:
+def find_frames(root: str | Path) -> list[FrameFolder]:
     """Return the frames of a folder: itself if it is a frame, else all below it, sorted.
 
     Raises:
         FrameError: If `root` is no folder, or holds no frame at any depth.
     """
+    root = Path(root)
     if not root.is_dir():
         found = 'a file' if root.exists() else 'nothing there'
         raise FrameError(f'{root}: expected a folder with {EXPECTED}, found {found}')
@@ -52,20 +53,26 @@ def find_frames(root: Path) -> list[FrameFolder]:
     return [FrameFolder(path, path.relative_to(root)) for path in folders]
 
 
-def load_frame(folder: Path, stamp_ns: int = 0) -> RgbdFrame:
+def load_frame(folder: str | Path, stamp_ns: int = 0) -> RgbdFrame:
     """Return the frame of a folder; `camera.json` may lie in the parent folder.
+
+    Args:
+        folder: Where `color.png` and `depth.png` lie.
+        stamp_ns: Time of the colour image [ns], which the files do not tell.
 
     Raises:
         FrameError: If a file is missing, damaged, or does not fit the others.
     """
+    folder = Path(folder)
     for name in IMAGES:
         if not (folder / name).is_file():
             raise FrameError(f'{folder}: expected {name}, found none')
-    camera = load_camera(_camera_path(folder))
+    camera_path = _camera_path(folder)
+    camera, scale = load_camera(camera_path), load_depth_scale(camera_path)
     size = (camera.width, camera.height)
     rgb = load_rgb_png(folder / IMAGES[0], size)
-    depth_mm = load_depth_png(folder / IMAGES[1], size)
-    depth_m = np.where(depth_mm > 0, depth_mm * np.float32(0.001), np.float32(np.nan))
+    units = load_depth_png(folder / IMAGES[1], size)
+    depth_m = np.where(units > 0, units * np.float32(1.0 / scale), np.float32(np.nan))
     return RgbdFrame(rgb, depth_m.astype(np.float32), camera, stamp_ns)
 
 

@@ -28,8 +28,8 @@ class SourceError(PopError):
 
 
 def make_detector(
-    spec: str,
-    keypoints_dir: Path | None = None,
+    spec: str | Path,
+    keypoints_dir: str | Path | None = None,
     decoder: str | None = None,
     json_source: KeypointDetector | None = None,
 ) -> KeypointDetector:
@@ -48,10 +48,11 @@ def make_detector(
         SourceError: If there is no such source, or something that it needs is missing.
         NetworkShapeError: If a network fits no decoder.
     """
-    words = split_sources(spec)
+    words = split_sources(str(spec))
     if decoder is not None:
         words = _with_decoder(words, decoder)
-    return _combined([_source(word, keypoints_dir, json_source) for word in words], spec)
+    folder = None if keypoints_dir is None else Path(keypoints_dir)
+    return _combined([_source(word, folder, json_source) for word in words], str(spec))
 
 
 def split_sources(spec: str) -> list[str]:

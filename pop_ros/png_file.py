@@ -65,7 +65,7 @@ def load_rgb_png(path: Path, size: tuple[int, int]) -> UInt8[np.ndarray, 'h w 3'
 
 
 def load_depth_png(path: Path, size: tuple[int, int]) -> UInt16[np.ndarray, 'h w']:
-    """Return a 16-bit depth image [mm, 0 = no measurement].
+    """Return a 16-bit depth image in units of its own; 0 is no measurement.
 
     Args:
         path: PNG file.
@@ -76,12 +76,12 @@ def load_depth_png(path: Path, size: tuple[int, int]) -> UInt16[np.ndarray, 'h w
     """
     content, header = _checked(path, size)
     if header.bits != 16 or header.kind != 'gray':
-        raise FrameError(f'{path}: expected depth as 16-bit gray [mm], found {header}')
+        raise FrameError(f'{path}: expected depth as 16-bit gray, found {header}')
     flags = cv2.IMREAD_UNCHANGED | cv2.IMREAD_IGNORE_ORIENTATION
-    depth_mm = cv2.imdecode(np.frombuffer(content, np.uint8), flags)
-    if depth_mm is None:
+    units = cv2.imdecode(np.frombuffer(content, np.uint8), flags)
+    if units is None:
         raise FrameError(f'{path}: expected a PNG that decodes, found {header} that does not')
-    return np.asarray(depth_mm, dtype=np.uint16)
+    return np.asarray(units, dtype=np.uint16)
 
 
 def _checked(path: Path, size: tuple[int, int]) -> tuple[bytes, PngHeader]:

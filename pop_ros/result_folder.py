@@ -31,12 +31,15 @@ from pop_core.rgbd import RgbdFrame
 from pop_ros.camera_file import camera_json
 
 
-def write_results(folder: Path, frame: RgbdFrame, result: FrameResult, model: BodyModel) -> None:
+def write_results(
+    folder: str | Path, frame: RgbdFrame, result: FrameResult, model: BodyModel
+) -> None:
     """Write all files of one frame; `result.json` comes last and so marks a whole folder.
 
     Raises:
         OSError: If the folder cannot be written.
     """
+    folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     for stale in [folder / 'result.json', *folder.glob('person_*.npz')]:
         stale.unlink(missing_ok=True)
@@ -106,7 +109,7 @@ def status_sentence(result: FrameResult) -> str:
     return '; '.join([fitted, *(f'{count} not fitted: {why}' for why, count in dropped.items())])
 
 
-def write_png(path: Path, pixels: np.ndarray) -> None:
+def write_png(path: str | Path, pixels: np.ndarray) -> None:
     """Write an RGB picture, or an image of one channel of 8 or 16 bits.
 
     Raises:
@@ -116,7 +119,7 @@ def write_png(path: Path, pixels: np.ndarray) -> None:
     done, content = cv2.imencode('.png', image)
     if not done:
         raise OSError(f'{path}: the picture could not be encoded')
-    path.write_bytes(content.tobytes())
+    Path(path).write_bytes(content.tobytes())
 
 
 def _person_json(index: int, body: BodyEstimate) -> dict[str, Any]:

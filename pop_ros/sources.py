@@ -21,8 +21,8 @@ Progress = Callable[[float, str], None]
 def make_pipeline(
     detector: KeypointDetector,
     config: PipelineConfig | None = None,
-    body_file: Path | None = None,
-    library_file: Path | None = None,
+    body_file: str | Path | None = None,
+    library_file: str | Path | None = None,
     progress: Progress | None = None,
 ) -> BodyPipeline:
     """Return a pipeline with its body model and pose library loaded and its kernels compiled.
@@ -36,10 +36,12 @@ def make_pipeline(
             before kernels are compiled for the first time.
 
     Raises:
+        SourceError: If the detector is none.
         PopError: If a file is damaged or not of its format.
     """
     from pop_core.body.default_body import default_body
     from pop_core.body.model_file import load_body_model
+    from pop_core.keypoints.detection import KeypointDetector
     from pop_core.pipeline import BodyPipeline
     from pop_core.retrieval.default_library import default_library
     from pop_core.retrieval.library_file import load_library
@@ -47,6 +49,10 @@ def make_pipeline(
     from pop_ros.kernel_cache import look_at_kernels
     from pop_ros.warm_up import warm_up
 
+    if isinstance(detector, type) or not isinstance(detector, KeypointDetector):
+        raise SourceError(
+            "pipeline: expected a detector with detect(frame), as make_detector('depth') makes, "
+            f'found {detector!r}')
     model = default_body() if body_file is None else load_body_model(body_file)
     told = None if progress is None else _as_counter(progress)
     library = default_library(told) if library_file is None else load_library(library_file)

@@ -47,12 +47,13 @@ class ModelNotes:
     provenance: str
 
 
-def load_body_model(path: Path) -> BodyModel:
+def load_body_model(path: str | Path) -> BodyModel:
     """Read and check a body model file written by `save_body_model`.
 
     Raises:
         ModelFileError: If the file is missing, damaged, or its arrays do not form a body.
     """
+    path = Path(path)
     arrays = _read_arrays(path)
     missing = [name for name in ('name', *ARRAY_NAMES) if name not in arrays]
     if missing:
@@ -67,13 +68,13 @@ def load_body_model(path: Path) -> BodyModel:
     return model
 
 
-def load_model_notes(path: Path) -> ModelNotes:
+def load_model_notes(path: str | Path) -> ModelNotes:
     """Read licence and provenance of a body model file; empty where it states none."""
-    arrays = _read_arrays(path)
+    arrays = _read_arrays(Path(path))
     return ModelNotes(str(arrays.get('licence', '')), str(arrays.get('provenance', '')))
 
 
-def save_body_model(path: Path, model: BodyModel, notes: ModelNotes) -> None:
+def save_body_model(path: str | Path, model: BodyModel, notes: ModelNotes) -> None:
     """Write a body model: directions as float16 (0.1 mm at 20 cm), everything else 32 bits."""
     half, single, whole = np.float16, np.float32, np.int32
     arrays: dict[str, Any] = {
@@ -91,7 +92,7 @@ def save_body_model(path: Path, model: BodyModel, notes: ModelNotes) -> None:
     }
     if model.posedirs is not None:
         arrays['posedirs'] = model.posedirs.astype(half)
-    with path.open('wb') as stream:
+    with Path(path).open('wb') as stream:
         np.savez_compressed(stream, **arrays)
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from pop_core.body.body_facts import stature_m
 from pop_core.body.captured_arrays import dense_array
 from pop_core.body.decimation import decimate
 from pop_core.body.joints import JOINT_INDEX, N_JOINTS, PARENTS
@@ -26,6 +27,9 @@ NEEDED = ('v_template', 'shapedirs', 'J_regressor', 'weights', 'kintree_table', 
 FIT_VERTICES = 1200
 COMMON_JOINTS = 22  # pelvis to wrists: the same in every family
 ENTRIES = 9  # of one rotation matrix in the pose blend feature
+STATURE_M = (0.4, 2.5)  # of a mean body: infants (SMIL) to giants
+# How many make a metre; no two of them take one number for a stature.
+OTHER_UNITS = {'feet': 3.281, 'inches': 39.37, 'centimetres': 100.0, 'millimetres': 1000.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +57,7 @@ FAMILIES = {
 }
 
 
-def import_body_model(path: Path, n_betas: int = 10) -> BodyModel:
+def import_body_model(path: str | Path, n_betas: int = 10) -> BodyModel:
     """Read a body of the SMPL family, whatever its number of joints.
 
     Args:
@@ -61,9 +65,10 @@ def import_body_model(path: Path, n_betas: int = 10) -> BodyModel:
         n_betas: Shape coefficients to keep, the first ones; expressions come later in SMPL-X.
 
     Raises:
-        ModelFileError: If the file is damaged or of another family.
+        ModelFileError: If the file is damaged, of another family, or not in metres with y up.
         UnsafeFileError: If the file asks for code to be run.
     """
+    path = Path(path)
     raw = _load_raw(path)
     arrays = {name: dense_array(raw[name], f'{path}: {name}') for name in NEEDED}
     family = _family(arrays['weights'], path)
@@ -85,6 +90,7 @@ def import_body_model(path: Path, n_betas: int = 10) -> BodyModel:
         fit_faces=fit_faces,
     )
     check_body_model(model, str(path))
+    _check_stature(model, path)
     return model
 
 
@@ -115,6 +121,18 @@ def _load_npz(path: Path) -> dict[str, Any]:
             f'{path}: expected an npz archive of plain arrays, found none, a damaged one, or '
             'pickled objects'
         ) from error
+
+
+def _check_stature(model: BodyModel, path: Path) -> None:
+    low, high = STATURE_M
+    found = stature_m(model, np.zeros(model.n_betas))
+    if low <= found <= high:
+        return
+    units = [name for name, count in OTHER_UNITS.items() if 1.0 <= found / count <= high]
+    guess = f', which would be {units[0]}' if units else ''
+    raise ModelFileError(
+        f'{path}: expected v_template in metres with y up, a mean body {low} to {high} m tall, '
+        f'found one of {found:.4g}{guess}')
 
 
 def _family(weights: np.ndarray, path: Path) -> Family:

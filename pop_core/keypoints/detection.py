@@ -8,9 +8,14 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, Int, Int8
 
-from pop_core.body.joints import SHARED_MIRROR
+from pop_core.body.joints import N_SHARED, SHARED_MIRROR
+from pop_core.errors import DetectionError
 from pop_core.keypoints.body_parts import LABEL_MIRROR
 from pop_core.rgbd import RgbdFrame
+
+SHAPES = {
+    'keypoints_px': (N_SHARED, 2), 'scores': (N_SHARED,), 'box_px': (4,),
+    'joint_depth_m': (N_SHARED,), 'joint_sigma_m': (N_SHARED,), 'visible': (N_SHARED,)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,6 +32,9 @@ class Detection:
         visible: Probability that each joint is seen, not hidden; None when the source cannot say.
         person_mask: Pixels of this person, or None.
         part_labels: Joint index (0..23) of the body part at each pixel, -1 elsewhere, or None.
+
+    Raises:
+        DetectionError: If an array has not one row for each of the 15 shared joints.
     """
 
     keypoints_px: Float[np.ndarray, 's 2']
@@ -37,6 +45,15 @@ class Detection:
     visible: Float[np.ndarray, 's'] | None = None
     person_mask: Bool[np.ndarray, 'h w'] | None = None
     part_labels: Int8[np.ndarray, 'h w'] | None = None
+
+    def __post_init__(self) -> None:
+        for name, shape in SHAPES.items():
+            values = getattr(self, name)
+            if values is not None and np.shape(values) != shape:
+                raise DetectionError(
+                    f'detection: expected {name} of shape {shape}, for the {N_SHARED} joints of '
+                    f'pop_core.body.joints.SHARED_NAMES, found {np.shape(values)}: '
+                    'pop_core.keypoints.people.detections_of converts keypoint sets')
 
     @property
     def score(self) -> float:

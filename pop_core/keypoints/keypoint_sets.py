@@ -1,4 +1,8 @@
-"""From the keypoint sets of the field to the 15 shared joints; the one place that knows them."""
+"""From the keypoint sets of the field to the 15 shared joints; the one place that knows them.
+
+Orders: COCO-17 of the dataset's person_keypoints annotations, COCO-WholeBody-133 and Halpe-26 of
+theirs, MPII-16 of its annotations, BODY_25 and COCO-18 of OpenPose's poseParameters.cpp.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pop_core.body.joints import BODY_25_OF_SHARED, COCO_17_NAMES, N_SHARED, SHARED_NAMES
+from pop_core.errors import DetectionError
 from pop_core.keypoints.neck import with_smpl_neck
 
 # Where a set marks neither: midway between hips and between shoulders.
@@ -46,7 +51,16 @@ def shared_joints(
         keypoints: The set whose keypoints are given.
         keypoints_px: Pixels (u, v).
         scores: Confidence 0..1 of each.
+
+    Raises:
+        DetectionError: If there are more or fewer than the set has.
     """
+    expected = (len(keypoints), 2), (len(keypoints),)
+    found = np.shape(keypoints_px), np.shape(scores)
+    if found != expected:
+        raise DetectionError(
+            f'{keypoints.name}: expected pixels and scores of shapes {expected[0]} and '
+            f'{expected[1]}, found {found[0]} and {found[1]}')
     row = {name: index for index, name in enumerate(keypoints.names)}
     finite = np.isfinite(keypoints_px).all(axis=1) & np.isfinite(scores)
     known = np.where(finite, np.clip(np.nan_to_num(scores), 0.0, 1.0), 0.0)
@@ -90,3 +104,5 @@ HALPE_26 = KeypointSet('Halpe-26', (
 WHOLEBODY_133 = KeypointSet('COCO-WholeBody-133', (
     *COCO_17_NAMES, *(f'other_{row}' for row in range(17, 133))))
 BY_COUNT = {len(keypoints): keypoints for keypoints in (COCO_17, HALPE_26, WHOLEBODY_133)}
+# Of OpenPose, and of what writes its files for other networks.
+OF_FILES = BY_COUNT | {len(keypoints): keypoints for keypoints in (COCO_18, BODY_25)}

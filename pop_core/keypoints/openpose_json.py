@@ -1,4 +1,8 @@
-"""People as OpenPose writes them: JSON files of BODY_25 keypoints in pixels, and back."""
+"""People as OpenPose writes them: JSON files of keypoints in pixels; BODY_25 is written back.
+
+Sets are told apart by their number of keypoints: BODY_25 and COCO-18 are OpenPose's own, others
+write COCO-17, Halpe-26 and COCO-WholeBody-133 into its format.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +17,14 @@ from jaxtyping import Float
 from pop_core.body.joints import BODY_25_OF_SHARED
 from pop_core.errors import KeypointFileError
 from pop_core.keypoints.detection import Detection
-from pop_core.keypoints.neck import with_detector_neck, with_smpl_neck
-from pop_core.keypoints.people import detection_of
+from pop_core.keypoints.keypoint_sets import BODY_25, OF_FILES, KeypointSet
+from pop_core.keypoints.neck import with_detector_neck
+from pop_core.keypoints.people import detections_of
 from pop_core.rgbd import RgbdFrame
 
-N_BODY_25 = 25
-OTHER_SETS = {54: 'COCO-18', 45: 'MPI-15', 51: 'COCO-17', 405: 'BODY_135'}
+OTHER_SETS = {15: 'MPI-15', 135: 'BODY_135'}
+KNOWN = ', '.join(f'{count} ({known.name})' for count, known in sorted(OF_FILES.items()))
+Rows = tuple[KeypointSet, Float[np.ndarray, 'k 3']]
 
 
 class NoKeypointsError(KeypointFileError):
@@ -28,12 +34,13 @@ class NoKeypointsError(KeypointFileError):
 class OpenPoseJsonDetector:
     """People of a folder of files named by the colour stamp, `<stamp_ns>.json`."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: str | Path) -> None:
         """Take an existing folder.
 
         Raises:
             KeypointFileError: If there is no such folder.
         """
+        folder = Path(folder)
         if not folder.is_dir():
             raise KeypointFileError(f'{folder}: expected a folder of keypoint files, found none')
         self.folder = folder
@@ -54,7 +61,7 @@ class OpenPoseJsonDetector:
 class FileDetector:
     """People of one file, whatever frame is asked for."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: str | Path) -> None:
         """Read the file at once, so that a damaged one is told before any work.
 
         Raises:
@@ -67,39 +74,37 @@ class FileDetector:
         return list(self.people)
 
 
-def read_openpose_json(path: Path) -> list[Detection]:
+def read_openpose_json(path: str | Path) -> list[Detection]:
     """Return the people of one OpenPose file, best first; nobody is an empty list.
 
     Raises:
-        KeypointFileError: If it is not OpenPose JSON of BODY_25 people in pixels.
+        KeypointFileError: If it is not OpenPose JSON of people in pixels, of a set we know.
     """
+    path = Path(path)
     document = _load(path)
     people = document.get('people') if isinstance(document, dict) else None
     if not isinstance(people, list):
         raise KeypointFileError(
             f"{path}: expected an object with a list 'people', found {_short(document)}"
         )
-    detections = []
+    detections: list[Detection] = []
     for number, person in enumerate(people):
-        rows = _body_25(person, f'{path}: person {number}')
-        shared = rows[BODY_25_OF_SHARED]
-        if np.any(shared[:, 2] > 0):
-            found = detection_of(shared[:, :2], shared[:, 2])
-            detections.append(detection_of(with_smpl_neck(found.keypoints_px), found.scores))
+        keypoints, rows = _rows(person, f'{path}: person {number}')
+        detections += detections_of(keypoints, [(rows[:, :2], rows[:, 2])])
     return sorted(detections, key=lambda person: -person.score)
 
 
-def write_openpose_json(path: Path, detections: Sequence[Detection]) -> None:
+def write_openpose_json(path: str | Path, detections: Sequence[Detection]) -> None:
     """Write people as OpenPose does; keypoints outside the 15 shared ones are 0, 0, 0."""
     people = []
     for detection in detections:
-        rows = np.zeros((N_BODY_25, 3))
+        rows = np.zeros((len(BODY_25), 3))
         found = detection.scores > 0
         uv = with_detector_neck(detection.keypoints_px)
         shared = np.column_stack([uv, detection.scores])
         rows[BODY_25_OF_SHARED[found]] = shared[found]
         people.append({'person_id': [-1], 'pose_keypoints_2d': rows.ravel().round(4).tolist()})
-    path.write_text(json.dumps({'version': 1.3, 'people': people}) + '\n', encoding='utf-8')
+    Path(path).write_text(json.dumps({'version': 1.3, 'people': people}) + '\n', encoding='utf-8')
 
 
 def _load(path: Path) -> Any:
@@ -117,30 +122,30 @@ def _refuse_constant(name: str) -> NoReturn:
     raise ValueError(f'{name}, which is not a number')
 
 
-def _body_25(person: object, where: str) -> Float[np.ndarray, '25 3']:
-    """Return the rows (u, v, score) of one person, scores cut to 0..1."""
+def _rows(person: object, where: str) -> Rows:
+    """Return which keypoints one person has, and their rows (u, v, score)."""
     values = person.get('pose_keypoints_2d') if isinstance(person, dict) else None
     if not isinstance(values, list):
         raise KeypointFileError(
             f"{where}: expected a list 'pose_keypoints_2d', found {_short(person)}"
         )
-    if len(values) != 3 * N_BODY_25:
-        name = OTHER_SETS.get(len(values), 'an unknown set')
+    count, left = divmod(len(values), 3)
+    if left or count not in OF_FILES:
+        name = 'an unknown set' if left else OTHER_SETS.get(count, 'an unknown set')
         raise KeypointFileError(
-            f'{where}: expected {3 * N_BODY_25} numbers (BODY_25), found {len(values)} ({name})'
-        )
+            f'{where}: expected three numbers for each of {KNOWN} keypoints, found '
+            f'{len(values)} numbers ({name})')
     if not all(isinstance(value, int | float) and abs(value) < 1e6 for value in values):
         bad = next(v for v in values if not isinstance(v, int | float) or not abs(v) < 1e6)
         raise KeypointFileError(f'{where}: expected pixels and scores, found {_short(bad)}')
-    rows = np.array(values, dtype=np.float64).reshape(N_BODY_25, 3)
+    rows = np.array(values, dtype=np.float64).reshape(count, 3)
     found = rows[:, 2] > 0
     if np.count_nonzero(found) > 2 and np.abs(rows[found, :2]).max() <= 1.0:
         raise KeypointFileError(
             f'{where}: expected pixels, found only values up to 1: write keypoints at the '
             "input's resolution (--keypoint_scale 0)"
         )
-    rows[:, 2] = np.clip(rows[:, 2], 0.0, 1.0)
-    return rows
+    return OF_FILES[count], rows
 
 
 def _short(value: object) -> str:

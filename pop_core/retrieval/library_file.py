@@ -55,10 +55,10 @@ def array_shapes(poses: int) -> dict[str, tuple[int, ...]]:
 
 
 def save_library(
-    library: PoseLibrary, path: Path, notes: Mapping[str, str] | None = None
+    library: PoseLibrary, path: str | Path, notes: Mapping[str, str] | None = None
 ) -> None:
     """Write a library so that a reader never sees half a file."""
-    with new_library_file(path, len(library), notes or {}) as arrays:
+    with new_library_file(Path(path), len(library), notes or {}) as arrays:
         for name in ARRAYS:
             arrays[name][...] = getattr(library, name)
 
@@ -99,12 +99,13 @@ class new_library_file:  # noqa: N801 - used as a function, like open()
         self.partial.replace(self.path)
 
 
-def read_header(path: Path) -> LibraryHeader:
+def read_header(path: str | Path) -> LibraryHeader:
     """Return what a file says about itself.
 
     Raises:
         LibraryFileError: If it is no library file, of another version, or cut short.
     """
+    path = Path(path)
     try:
         with path.open('rb') as file:
             start = file.read(16)
@@ -125,7 +126,7 @@ def read_header(path: Path) -> LibraryHeader:
     return LibraryHeader(poses, checksum, notes, places)
 
 
-def load_library(path: Path, *, verify: bool = False) -> PoseLibrary:
+def load_library(path: str | Path, *, verify: bool = False) -> PoseLibrary:
     """Return a library whose arrays stay in the file until they are touched.
 
     Args:
@@ -135,6 +136,7 @@ def load_library(path: Path, *, verify: bool = False) -> PoseLibrary:
     Raises:
         LibraryFileError: If the file is damaged or not a library of this version.
     """
+    path = Path(path)
     header = read_header(path)
     if verify:
         found = _checksum(path, ALIGNMENT)

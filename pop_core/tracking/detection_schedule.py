@@ -20,7 +20,6 @@ BLURRED_M, MOVING_M = 0.028, 0.05
 MOST_TRIES = 3  # whom looks go on contradicting is no news any more
 SOON = 2  # frames from one look to the next while somebody is not followed well
 # Frames are counted as of such a camera: at a lower rate people move farther from one to the next.
-# Those without a clock, all of one stamp, count as such too.
 RATE_HZ = 30.0
 # A camera that is slower leaves time to wait for a look, for this share of what lies between two
 # of its frames: whoever is followed is drawn to where their limbs are, not to where they were.
@@ -103,7 +102,7 @@ class DetectionSchedule:
             is_empty: Whether the last look saw nobody.
         """
         self._frames_since += 1
-        self._since_s += gap.of_camera_s or 1.0 / RATE_HZ
+        self._since_s += gap.of_camera_s
         if is_looking or (not tracks and is_busy and not is_late):
             return False
         every = self._config.detect_every

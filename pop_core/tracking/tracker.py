@@ -9,6 +9,7 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from pop_core.depth_noise import USUAL_NOISE
+from pop_core.errors import RepeatedStampError
 from pop_core.estimate import BodyEstimate, EstimateStatus, FrameResult, TrackState
 from pop_core.geometry.camera import Camera
 from pop_core.pipeline import BodyPipeline, Scene
@@ -42,6 +43,8 @@ CALM_FRAMES = 30  # since one was left out: before, nothing is waited for
 # Focal length and principal point that move by less are the same; by a larger share of the focal
 # length, another camera's.
 SAME_CAMERA_PX, REFOCUSED_SHARE = 0.5, 0.01
+# No camera is as fast: what comes sooner came twice, or its stamp is no time in nanoseconds.
+SHORTEST_GAP_NS = 1_000_000
 
 
 class BodyTracker:
@@ -93,12 +96,14 @@ class BodyTracker:
         """Return the people of the next frame, nearest first, each with their track.
 
         A jump back in time or another camera ends all tracks: what follows is another recording.
+        A frame that is refused changes nothing: the next one goes on.
 
         Args:
             frame: The frame.
             skipped: Frames of the camera since the last one that nobody had time for.
 
         Raises:
+            RepeatedStampError: If the stamp is that of the frame before, or next to it.
             PopError: If the keypoint source cannot read what it needs for this frame, or could not
                 for an earlier one that was looked at meanwhile.
         """
@@ -106,6 +111,7 @@ class BodyTracker:
         frame = self._of_known_camera(frame)
         if self._is_another_recording(frame):
             self._forget()
+        self._check_stamp(frame)
         # What was left out before the first one was no lack of time.
         self._in_time = 0 if skipped and self._last is not None else self._in_time + 1
         self._gap = Gap(
@@ -158,6 +164,16 @@ class BodyTracker:
         camera, stamp_ns = self._last
         refocused_px = REFOCUSED_SHARE * camera.fx
         return frame.stamp_ns < stamp_ns or not camera.sees_like(frame.camera, refocused_px)
+
+    def _check_stamp(self, frame: RgbdFrame) -> None:
+        # One moment counted twice would be evidence that nobody moves.
+        if self._last is None or frame.stamp_ns - self._last[1] >= SHORTEST_GAP_NS:
+            return
+        raise RepeatedStampError(
+            f'tracker: expected a stamp at least {SHORTEST_GAP_NS} ns after that of the frame '
+            f'before, {self._last[1]}, found {frame.stamp_ns}: the same frame again, or stamps '
+            'that stand still or count no nanoseconds; frames without a clock can be fitted '
+            'alone (BodyPipeline, or tracking.enabled=false in the node)')
 
     def _look(
         self, frame: RgbdFrame, seen: RgbdFrame, watch: Stopwatch, *, is_late: bool,

@@ -45,6 +45,46 @@ def test_zero_depth_is_no_measurement(folder):
     assert missing.sum() == before.sum() + 1
 
 
+def with_scale(folder, scale):
+    path = folder / 'camera.json'
+    path.write_text(json.dumps(json.loads(path.read_text()) | {'depth_scale': scale}))
+    return folder
+
+
+def test_depth_of_another_unit_is_read_by_its_scale(folder, scene):
+    units = np.rint(np.nan_to_num(scene[0].depth_m) * 5000).astype(np.uint16)
+    cv2.imwrite(str(folder / 'depth.png'), units)
+    frame = load_frame(with_scale(folder, 5000))
+    # Half a unit of 0.2 mm.
+    np.testing.assert_allclose(frame.depth_m, scene[0].depth_m, atol=0.1001e-3)
+
+
+def test_millimetres_may_be_said(folder):
+    before = load_frame(folder)
+    np.testing.assert_array_equal(load_frame(with_scale(folder, 1000)).depth_m, before.depth_m)
+
+
+@pytest.mark.parametrize(('scale', 'sentence'), [
+    (0, 'units per metre.*found 0$'),
+    (-1000, 'found -1000$'),
+    (0.001, r'found 0\.001: 1000, where that is metres per unit$'),
+    (1e300, r'found 1e\+300$'),
+    (float('inf'), 'finite number, found inf'),
+    (float('nan'), 'finite number, found nan'),
+    ('5000', "finite number, found '5000'"),
+    (None, 'finite number, found nothing'),
+    (True, 'finite number, found True'),
+])
+def test_a_scale_that_is_none_gets_one_line_that_says_why(folder, scale, sentence):
+    with pytest.raises(FrameError, match=rf'camera\.json: expected depth_scale as .*{sentence}'):
+        load_frame(with_scale(folder, scale))
+
+
+def test_folders_may_be_named_by_text(folder):
+    np.testing.assert_array_equal(load_frame(str(folder)).depth_m, load_frame(folder).depth_m)
+    assert [found.path for found in find_frames(str(folder))] == [folder]
+
+
 def test_camera_may_lie_in_the_parent_folder(folder):
     (folder / 'camera.json').rename(folder.parent / 'camera.json')
     assert load_frame(folder).camera.width == 160

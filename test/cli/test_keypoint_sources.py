@@ -20,6 +20,7 @@ from pop_ros.fit_keypoints import FrameKeypoints
 from pop_ros.frame_folder import FrameFolder, load_frame
 from pop_ros.keypoint_sources import SourceError, make_detector, reasons, split_sources
 from pop_ros.node_arguments import parse_arguments
+from pop_ros.sources import make_pipeline
 
 
 def zeros(*shape):
@@ -47,6 +48,17 @@ def test_one_network_is_itself(networks):
     assert isinstance(detector, OnnxKeypointDetector)
     assert len(reasons(detector)) == 1
     assert 'read as rtmo' in reasons(detector)[0]
+
+
+def test_files_and_folders_may_be_named_by_text_and_by_path(networks, tmp_path):
+    assert isinstance(make_detector(Path(networks['people'])), OnnxKeypointDetector)
+    assert make_detector('json', str(tmp_path)).folder == tmp_path
+
+
+@pytest.mark.parametrize('detector', ['depth', FrameKeypoints, None])
+def test_a_pipeline_of_no_detector_is_refused_before_anything_is_loaded(detector):
+    with pytest.raises(SourceError, match=r'expected a detector with detect\(frame\)'):
+        make_pipeline(detector)
 
 
 def test_sources_of_all_kinds_find_their_part(networks):

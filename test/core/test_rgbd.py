@@ -11,10 +11,11 @@ CAMERA = Camera(8, 6, 10.0, 10.0, 3.5, 2.5)
 RGB = np.zeros((6, 8, 3), dtype=np.uint8)
 
 
-def unchecked(rgb: np.ndarray, depth_m: np.ndarray) -> None:
+def unchecked(rgb: np.ndarray, depth_m: np.ndarray, stamp_ns: object = 0) -> None:
     """Check a frame as users have it, without the types that tests are checked with."""
     frame = object.__new__(RgbdFrame)
-    for name, value in {'rgb': rgb, 'depth_m': depth_m, 'camera': CAMERA}.items():
+    fields = {'rgb': rgb, 'depth_m': depth_m, 'camera': CAMERA, 'stamp_ns': stamp_ns}
+    for name, value in fields.items():
         object.__setattr__(frame, name, value)
     frame.__post_init__()
 
@@ -49,6 +50,16 @@ def test_depth_of_another_type_is_told_with_what_to_do(kind: type) -> None:
 def test_colour_of_another_kind_is_told_with_what_to_do(rgb: np.ndarray) -> None:
     with pytest.raises(FrameError, match=r'expected colour as uint8 .*found .*cv2.cvtColor'):
         unchecked(rgb, depth_with(2.0))
+
+
+@pytest.mark.parametrize('stamp_ns', [1.7e9, '17', None])
+def test_a_stamp_that_is_no_integer_is_told_with_what_to_do(stamp_ns: object) -> None:
+    with pytest.raises(FrameError, match=rf'found {stamp_ns!r}: .*1e9'):
+        unchecked(RGB, depth_with(2.0), stamp_ns)
+
+
+def test_stamps_of_numpy_are_integers_too() -> None:
+    unchecked(RGB, depth_with(2.0), np.int64(17))
 
 
 def test_pixels_without_a_measurement_are_fine() -> None:

@@ -144,3 +144,20 @@ def test_a_frame_that_waits_for_a_stuck_source_is_given_up_at_the_end(
         assert clock.spin_until(lambda: work.looking_s > 0.0, 20)
     assert work.stop(0.1)
     assert statistics.snapshot().drops == {'finding': 1}
+
+
+def test_a_pair_that_comes_twice_is_dropped_and_explained(
+    node: LifecycleNode, tmp_path: Path
+) -> None:
+    recording = record(tmp_path, n_frames=3, rate_hz=15.0)
+    work, statistics = prepared(node, recording.keypoints)
+    with Listener() as clock:
+        assert clock.spin_until(lambda: work.is_ready, READY_S)
+        work.run(True)
+        for number in (1, 2, 2, 3):
+            work.put(messages(recording, number))
+            assert clock.spin_until(lambda: statistics.snapshot().pending == 0, 20)
+    assert work.stop(10)
+    snapshot = statistics.snapshot()
+    assert (snapshot.frames, snapshot.faults, snapshot.drops) == (3, 0, {'repeated stamp': 1})
+    assert 'the same frame again' in snapshot.latest_drop

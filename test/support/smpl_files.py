@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pop_core.body.joints import PARENTS
+from pop_core.geometry.rotation import from_rotvec
 
 N_VERTICES = 120
 BODY_JOINTS = 22
@@ -41,7 +42,7 @@ def family_arrays(joints: int, shapes: int, features: int, seed: int = 0) -> dic
     regressor[:, 0] += 0.1
     parents = np.array(family_parents(joints), dtype=np.int64)
     return {
-        'v_template': rng.normal(size=(N_VERTICES, 3)),
+        'v_template': rng.uniform(-0.9, 0.9, size=(N_VERTICES, 3)),  # metres
         'shapedirs': 0.01 * rng.normal(size=(N_VERTICES, 3, shapes)),
         'posedirs': 0.01 * rng.normal(size=(N_VERTICES, 3, features)),
         'weights': weights / weights.sum(axis=1, keepdims=True),
@@ -50,6 +51,28 @@ def family_arrays(joints: int, shapes: int, features: int, seed: int = 0) -> dic
         'kintree_table': np.stack([parents, np.arange(joints)]).astype(np.uint32),
         'f': _triangles(rng),
     }
+
+
+def slow_skinning(
+    arrays: dict[str, np.ndarray], rotvecs: np.ndarray, betas: np.ndarray
+) -> np.ndarray:
+    """LBS of all published joints, 4x4 matrix by 4x4 matrix (Loper et al. 2015)."""
+    shaped = arrays['v_template'] + arrays['shapedirs'][:, :, : len(betas)] @ betas
+    rest = arrays['J_regressor'] @ shaped
+    R = np.stack([from_rotvec(rotvec) for rotvec in rotvecs])
+    if arrays['posedirs'].shape[2] == 9 * (len(R) - 1):
+        shaped = shaped + arrays['posedirs'] @ (R[1:] - np.eye(3)).ravel()
+    world: list[np.ndarray] = []
+    for joint, parent in enumerate(family_parents(len(R))):
+        local = np.eye(4)
+        local[:3, :3] = R[joint]
+        local[:3, 3] = rest[joint] - (rest[parent] if parent >= 0 else 0)
+        world.append(world[parent] @ local if parent >= 0 else local)
+    out = np.zeros_like(shaped)
+    for joint, T in enumerate(world):
+        carried = (shaped - rest[joint]) @ T[:3, :3].T + T[:3, 3]
+        out += arrays['weights'][:, [joint]] * carried
+    return out
 
 
 def _triangles(rng: np.random.Generator) -> np.ndarray:

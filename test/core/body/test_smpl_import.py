@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse import csc_matrix, csr_matrix
 from support.smpl_files import (
     family_arrays,
-    family_parents,
+    slow_skinning,
     write_python2_pickle,
     write_smpl_pickle,
 )
@@ -18,7 +18,6 @@ from pop_core.body.model_file import ModelNotes, load_body_model, save_body_mode
 from pop_core.body.skinning import vertices
 from pop_core.body.smpl_import import import_body_model
 from pop_core.errors import ModelFileError, UnsafeFileError
-from pop_core.geometry.rotation import from_rotvec
 
 # Columns of the published joint orders: fingers of the left, then of the right hand.
 FINGERS = {52: (slice(22, 37), slice(37, 52)), 55: (slice(25, 40), slice(40, 55))}
@@ -29,28 +28,6 @@ LEFT, RIGHT, HEAD = (JOINT_INDEX[name] for name in ('left_hand', 'right_hand', '
 def _npz(path: Path, arrays: dict[str, np.ndarray], **more: np.ndarray) -> Path:
     np.savez(path, **arrays, **more)
     return path
-
-
-def _slow_skinning(
-    arrays: dict[str, np.ndarray], rotvecs: np.ndarray, betas: np.ndarray
-) -> np.ndarray:
-    """LBS of all published joints, 4x4 matrix by 4x4 matrix (Loper et al. 2015)."""
-    shaped = arrays['v_template'] + arrays['shapedirs'][:, :, : len(betas)] @ betas
-    rest = arrays['J_regressor'] @ shaped
-    R = np.stack([from_rotvec(rotvec) for rotvec in rotvecs])
-    if arrays['posedirs'].shape[2] == 9 * (len(R) - 1):
-        shaped = shaped + arrays['posedirs'] @ (R[1:] - np.eye(3)).ravel()
-    world: list[np.ndarray] = []
-    for joint, parent in enumerate(family_parents(len(R))):
-        local = np.eye(4)
-        local[:3, :3] = R[joint]
-        local[:3, 3] = rest[joint] - (rest[parent] if parent >= 0 else 0)
-        world.append(world[parent] @ local if parent >= 0 else local)
-    out = np.zeros_like(shaped)
-    for joint, T in enumerate(world):
-        carried = (shaped - rest[joint]) @ T[:3, :3].T + T[:3, 3]
-        out += arrays['weights'][:, [joint]] * carried
-    return out
 
 
 def _random_pose(joints: int) -> tuple[np.ndarray, BodyParameters]:
@@ -66,7 +43,7 @@ def _random_pose(joints: int) -> tuple[np.ndarray, BodyParameters]:
 
 def _assert_same_bodies(model: BodyModel, arrays: dict[str, np.ndarray]) -> None:
     rotvecs, parameters = _random_pose(arrays['weights'].shape[1])
-    slow = _slow_skinning(arrays, rotvecs, parameters.betas)
+    slow = slow_skinning(arrays, rotvecs, parameters.betas)
     np.testing.assert_allclose(vertices(model, parameters), slow, atol=1e-9)
 
 
@@ -244,6 +221,32 @@ def test_pickled_arrays_in_an_npz_are_refused(
     smpl['weights'] = np.array([_Runs(os.system, 'true')], dtype=object)
     with pytest.raises(ModelFileError, match='plain arrays'):
         import_body_model(_npz(tmp_path / 'm.npz', smpl))
+
+
+@pytest.mark.parametrize(('per_metre', 'unit'), [
+    (3.281, 'feet'), (39.37, 'inches'), (100.0, 'centimetres'), (1000.0, 'millimetres')])
+def test_a_body_that_is_not_in_metres_is_refused_with_its_unit(
+    tmp_path: Path, smpl: dict[str, np.ndarray], per_metre: float, unit: str
+) -> None:
+    smpl['v_template'] *= per_metre
+    with pytest.raises(ModelFileError, match=rf'm\.npz: .*in metres .*would be {unit}$'):
+        import_body_model(_npz(tmp_path / 'm.npz', smpl))
+
+
+@pytest.mark.parametrize('factor', [0.1, 3.6e5])
+def test_a_body_of_no_unit_is_refused(
+    tmp_path: Path, smpl: dict[str, np.ndarray], factor: float
+) -> None:
+    smpl['v_template'] *= factor
+    with pytest.raises(ModelFileError, match=r'0\.4 to 2\.5 m tall, found one of [\d.e+]+$'):
+        import_body_model(_npz(tmp_path / 'm.npz', smpl))
+
+
+def test_a_file_may_be_named_by_text(tmp_path: Path, smpl: dict[str, np.ndarray]) -> None:
+    path = _npz(tmp_path / 'm.npz', smpl)
+    model = import_body_model(str(path))
+    save_body_model(str(tmp_path / 'copy.npz'), model, ModelNotes('theirs', 'here'))
+    assert load_body_model(str(tmp_path / 'copy.npz')).name == 'm'
 
 
 def test_another_suffix_and_a_missing_file_are_named(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pop_core.body.joints import (
     SHARED_NAMES,
     mirrored_name,
 )
+from pop_core.errors import DetectionError
 from pop_core.keypoints.keypoint_sets import (
     BODY_25,
     COCO_17,
@@ -96,3 +97,9 @@ def test_scores_stay_within_zero_and_one():
     _, shared_scores = shared_joints(COCO_17, uv, scores * 7 - 2)
     assert shared_scores.min() >= 0.0
     assert shared_scores.max() <= 1.0
+
+
+def test_keypoints_of_another_set_are_told():
+    uv, scores = keypoints_of(COCO_18)
+    with pytest.raises(DetectionError, match=r'COCO-17: expected .*\(17, 2\).*found .*\(18, 2\)'):
+        shared_joints(COCO_17, uv, scores)

@@ -3,9 +3,16 @@ import json
 import numpy as np
 import pytest
 
-from pop_core.body.joints import BODY_25_OF_SHARED, N_SHARED, SHARED_INDEX
+from pop_core.body.joints import BODY_25_OF_SHARED, N_SHARED, SHARED_INDEX, SHARED_NAMES
 from pop_core.errors import KeypointFileError
 from pop_core.geometry.camera import Camera
+from pop_core.keypoints.keypoint_sets import (
+    COCO_17,
+    COCO_18,
+    HALPE_26,
+    WHOLEBODY_133,
+    shared_joints,
+)
 from pop_core.keypoints.neck import with_smpl_neck
 from pop_core.keypoints.openpose_json import (
     FileDetector,
@@ -66,6 +73,36 @@ def test_each_body_25_row_lands_on_its_joint(tmp_path):
         assert person.keypoints_px[SHARED_INDEX[name]].tolist() == [100.0 + row, 200.0 + row]
 
 
+@pytest.mark.parametrize(
+    'keypoints', [COCO_17, COCO_18, HALPE_26, WHOLEBODY_133], ids=lambda k: k.name)
+def test_other_sets_are_told_by_their_number_of_keypoints(tmp_path, keypoints):
+    rng = np.random.default_rng(3)
+    px, scores = rng.uniform(10, 600, (len(keypoints), 2)), rng.uniform(0.1, 1, len(keypoints))
+    rows = np.column_stack([px, scores]).ravel().tolist()
+    (person,) = read_openpose_json(write(tmp_path / 'k.json', rows))
+    expected_px, expected_scores = shared_joints(keypoints, px, scores)
+    np.testing.assert_array_equal(person.keypoints_px, expected_px)
+    np.testing.assert_array_equal(person.scores, expected_scores)
+
+
+def test_each_coco_18_row_of_openpose_lands_on_its_joint(tmp_path):
+    # poseParameters.cpp: 0 nose, 1 neck, 2-4 right arm, 5-7 left arm, 8-10 right leg, 11-13 left.
+    rows = np.column_stack([np.arange(18) + 100.0, np.arange(18) + 200.0, np.full(18, 0.5)])
+    (person,) = read_openpose_json(write(tmp_path / 'k.json', rows.ravel().tolist()))
+    expected = {'head': 0, 'right_wrist': 4, 'left_elbow': 6, 'right_hip': 8, 'right_ankle': 10,
+                'left_hip': 11, 'left_knee': 12}
+    for name, row in expected.items():
+        assert person.keypoints_px[SHARED_INDEX[name]].tolist() == [100.0 + row, 200.0 + row]
+    assert person.keypoints_px[SHARED_NAMES.index('pelvis')].tolist() == [109.5, 209.5]
+
+
+def test_people_of_one_file_may_be_of_different_sets(tmp_path):
+    rng = np.random.default_rng(4)
+    people = [{'pose_keypoints_2d': rng.uniform(2, 600, 3 * n).tolist()} for n in (17, 25)]
+    (tmp_path / 'k.json').write_text(json.dumps({'people': people}))
+    assert len(read_openpose_json(str(tmp_path / 'k.json'))) == 2
+
+
 def test_zeros_are_undetected_keypoints(tmp_path):
     rows = np.zeros((25, 3))
     rows[BODY_25_OF_SHARED[:4]] = [50.0, 60.0, 0.8]
@@ -103,7 +140,8 @@ def test_scores_stay_within_one(tmp_path):
     ('{"people": [{"pose_keypoints_2d": [NaN]}]}', 'NaN'),
     ('{"people": [{"pose_keypoints_2d": [' + '1,' * 74 + '1e999]}]}', 'found inf'),
     ('{"people": [{"pose_keypoints_2d": [' + '1,' * 74 + '"a"]}]}', "found 'a'"),
-    ('{"people": [{"pose_keypoints_2d": [' + '1,' * 53 + '1]}]}', 'COCO-18'),
+    ('{"people": [{"pose_keypoints_2d": [' + '1,' * 44 + '1]}]}', 'found 45 numbers (MPI-15)'),
+    ('{"people": [{"pose_keypoints_2d": [' + '1,' * 51 + '1]}]}', '17 (COCO-17), 18 (COCO-18)'),
     ('{"people": [{"pose_keypoints_2d": [' + '9' * 5000 + ']}]}', 'expected OpenPose JSON'),
     ('{"people": [{"pose_keypoints_2d": [' + '0.5,' * 74 + '0.5]}]}', 'keypoint_scale'),
 ])

@@ -116,3 +116,8 @@ def test_merging_a_library_with_itself_adds_nothing(tmp_path):
     path = tmp_path / 'a.poplib'
     save_library(small_library(40, 3), path)
     assert merge_libraries(tmp_path / 'twice.poplib', [path, path], spacing_m=0.001) == 40
+
+
+def test_a_file_may_be_named_by_text(tmp_path):
+    save_library(small_library(), str(tmp_path / 'poses.poplib'))
+    assert len(load_library(str(tmp_path / 'poses.poplib'), verify=True)) == len(small_library())

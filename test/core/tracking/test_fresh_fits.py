@@ -261,13 +261,6 @@ def test_cameras_of_other_rates_are_looked_at_as_often_in_time(
         assert asked == pytest.approx(looks, abs=1)
 
 
-def test_frames_without_a_clock_count_as_those_of_a_usual_camera(
-    tracks: list[PersonTrack]
-) -> None:
-    schedule = DetectionSchedule(TrackingConfig(detect_every=3))
-    assert [schedule.is_due(tracks, Gap(0.0)) for _ in range(4)] == [True, False, False, True]
-
-
 def test_where_nobody_was_seen_looks_are_as_rare_as_while_all_are_followed_well() -> None:
     schedule = DetectionSchedule(TrackingConfig(detect_every=3))
     asked = [schedule.is_due([], QUICK, is_empty=True) for _ in range(4)]

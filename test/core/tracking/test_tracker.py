@@ -9,6 +9,7 @@ from support.stage import RATE_HZ, Stage, only
 
 from pop_core.body.kinematics import joints
 from pop_core.body.model import BodyModel, BodyParameters
+from pop_core.errors import RepeatedStampError
 from pop_core.estimate import TrackState
 from pop_core.tracking.tracking_config import TrackingConfig
 
@@ -129,10 +130,29 @@ def test_a_reset_counts_from_zero(stage: Stage, person: BodyParameters) -> None:
     assert only(stage.show(person)).track.id == 0
 
 
-def test_frames_of_one_stamp_are_one_moment(stage: Stage, person: BodyParameters) -> None:
+@pytest.mark.parametrize('later_ns', [0, 1, 33, 33_000], ids=['equal', 's', 'ms', 'us'])
+def test_a_frame_of_the_moment_before_is_refused_and_changes_nothing(
+    stage: Stage, body: BodyModel, person: BodyParameters, later_ns: int
+) -> None:
+    plain = Stage(body)
+    for here in (stage, plain):
+        here.show(person, times=3)
+    moved = person.replaced(transl=person.transl + [0.2, 0.0, 0.0])
+    frame = stage.frame(moved, hidden=False)
+    with pytest.raises(RepeatedStampError, match=f'found {frame.stamp_ns + later_ns}'):
+        stage.tracker.process(replace(frame, stamp_ns=frame.stamp_ns + later_ns))
+    after, expected = (only(here.show(person)) for here in (stage, plain))
+    np.testing.assert_array_equal(after.joints, expected.joints)
+    assert (after.track.id, after.track.age_s) == (0, expected.track.age_s)
+
+
+def test_a_frame_of_another_camera_may_have_the_stamp_before(
+    stage: Stage, person: BodyParameters
+) -> None:
     stage.show(person, times=3)
-    stage.stamp_ns -= round(1e9 / RATE_HZ)
-    assert only(stage.show(person)).track.id == 0
+    other = replace(CAMERA, fx=CAMERA.fx * 1.02, fy=CAMERA.fy * 1.02)
+    frame = replace(stage.frame(person, hidden=False), camera=other)
+    assert only(list(stage.tracker.process(frame).bodies)).track.id == 1
 
 
 def test_settings_change_without_losing_people(stage: Stage, person: BodyParameters) -> None:
