@@ -67,6 +67,7 @@ def fit(
     from pop_core.config import PipelineConfig
     from pop_ros.fit_keypoints import FrameKeypoints
     from pop_ros.fit_pictures import FitExplainer
+    from pop_ros.model_files import ModelFiles
     from pop_ros.progress import first_use_progress
     from pop_ros.settings_flags import with_flags
     from pop_ros.sources import make_pipeline
@@ -78,7 +79,7 @@ def fit(
     frames, bad = _collect(inputs)
     if frames:
         with first_use_progress() as progress:
-            pipeline = make_pipeline(source, config, body, library, progress)
+            pipeline = make_pipeline(source, config, ModelFiles(body, library), progress)
         explainer = FitExplainer(pipeline) if explain else None
         bad += _fit_all(frames, pipeline, source, out, explainer)
     raise typer.Exit(BAD_INPUT if bad else 0)

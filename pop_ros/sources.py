@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pop_ros.keypoint_sources import SOURCES, SourceError, apply_settings, make_detector
+from pop_ros.model_files import PACKAGED, ModelFiles
 
 if TYPE_CHECKING:
     from pop_core.config import PipelineConfig
@@ -21,8 +21,7 @@ Progress = Callable[[float, str], None]
 def make_pipeline(
     detector: KeypointDetector,
     config: PipelineConfig | None = None,
-    body_file: Path | None = None,
-    library_file: Path | None = None,
+    models: ModelFiles = PACKAGED,
     progress: Progress | None = None,
 ) -> BodyPipeline:
     """Return a pipeline with its body model and pose library loaded and its kernels compiled.
@@ -30,28 +29,19 @@ def make_pipeline(
     Args:
         detector: Keypoint source.
         config: Settings, of the source too; None takes the defaults.
-        body_file: Body model (.npz) in place of the default body.
-        library_file: Pose library in place of the default one.
+        models: Files of body model and pose library.
         progress: Called with a share 0..1 and a sentence while a first library is generated, and
             before kernels are compiled for the first time.
 
     Raises:
-        PopError: If a file is damaged or not of its format.
+        PopError: If a file is missing, damaged or not of its format.
     """
-    from pop_core.body.default_body import default_body
-    from pop_core.body.model_file import load_body_model
     from pop_core.pipeline import BodyPipeline
-    from pop_core.retrieval.default_library import default_library
-    from pop_core.retrieval.library_file import load_library
-    from pop_core.retrieval.pose_library import on_body
     from pop_ros.kernel_cache import look_at_kernels
     from pop_ros.warm_up import warm_up
 
-    model = default_body() if body_file is None else load_body_model(body_file)
-    told = None if progress is None else _as_counter(progress)
-    library = default_library(told) if library_file is None else load_library(library_file)
-    if body_file is not None:
-        library = on_body(library, model)
+    model = models.load_body()
+    library = models.load_library(model, None if progress is None else _as_counter(progress))
     if progress is not None and (missing := look_at_kernels().missing):
         progress(0.0, f'compiling kernels of {len(missing)} modules: about a minute, once')
     if config is not None:
