@@ -45,14 +45,12 @@ def show(
 
       pop show bodies bodies --out look --overlays
     """
-    from pop_core.body.default_body import default_body
-    from pop_core.body.model_file import load_body_model
+    from pop_ros.model_files import ModelFiles
     from pop_ros.show_recording import ShowRequest
 
     if out is None and rerun is None:
         raise typer.BadParameter('expected --out, --rerun or both, found neither')
-    model = default_body() if body is None else load_body_model(body)
-    _draw(model, rerun, out, ShowRequest(
+    _draw(ModelFiles(body).load_body(), rerun, out, ShowRequest(
         recordings=tuple(recording), bodies=bodies, out=out or Path(), topics=(color, depth, info),
         slop_s=slop, film=film, overlays=overlays))
 
@@ -62,10 +60,9 @@ def draw_replay(
     *, overlays: bool,
 ) -> None:
     """Draw what a replay has just recorded, with what it said."""
-    from pop_core.body.default_body import default_body
     from pop_ros.show_recording import ShowRequest
 
-    _draw(default_body(), rerun, out, ShowRequest(
+    _draw(replayed.models.load_body(), rerun, out, ShowRequest(
         recordings=replayed.bags, bodies=replayed.out, out=out or Path(), topics=replayed.topics,
         slop_s=replayed.slop_s, notes=notes, overlays=overlays))
 
