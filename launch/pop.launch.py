@@ -29,12 +29,15 @@ ARGUMENTS = {
     'keypoints': ('depth', 'json, depth, an ONNX network or a name of pop models list; commas'),
     'keypoints_dir': ('', 'folder of <stamp_ns>.json files, for keypoints:=json'),
     'decoder': ('', 'decoder of a network whose outputs do not tell'),
+    'body': ('', 'body model made by pop body import, in place of the default body'),
+    'library': ('', 'pose library made by pop library build, in place of the default one'),
     'params_file': ('pop.yaml', 'files of parameters with commas between, later ones win; names '
                     'without a folder are those of the package: '
                     + ', '.join(path.name for path in sorted(CONFIG.glob('*.yaml')))),
     'rviz': ('false', 'whether to start rviz2'),
     'large_data': ('true', 'whether to use shared memory that holds images (Fast DDS)'),
 }
+OPTIONAL = ('keypoints_dir', 'decoder', 'body', 'library')  # flags of the node, where given
 
 
 def parameter_files(text: str) -> list[str]:
@@ -50,10 +53,9 @@ def start_node(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     preset = camera_preset(given['camera'])
     topics = preset.topics
     flags = ['--keypoints', given['keypoints']]
-    if given['keypoints_dir']:
-        flags += ['--keypoints-dir', given['keypoints_dir']]
-    if given['decoder']:
-        flags += ['--decoder', given['decoder']]
+    for name in OPTIONAL:
+        if given[name]:
+            flags += [f'--{name.replace("_", "-")}', given[name]]
     advice = LogInfo(msg=f'pop reads {given["camera"]}; {preset.driver} needs: {preset.hint}')
     return [advice, Node(
         package='pop_ros', executable='pop_node', name='pop', output='screen', arguments=flags,

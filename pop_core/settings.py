@@ -8,7 +8,7 @@ written twice.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -74,10 +74,15 @@ def apply_settings(config: ConfigT, values: Mapping[str, Value]) -> ConfigT:
     """
     known = {item.name: item for item in list_settings(config)}
     for name, value in values.items():
-        if name not in known:
-            raise SettingError(f'{name}: expected one of {sorted(known)}, found an unknown name')
+        check_name(name, known)
         check_value(known[name], value)
     return _replace(config, values)
+
+
+def check_name(name: str, known: Collection[str]) -> None:
+    """Raise SettingError unless a setting of this name is known."""
+    if name not in known:
+        raise SettingError(f'{name}: expected one of {sorted(known)}, found an unknown name')
 
 
 def check_value(item: Setting, value: Value) -> None:

@@ -23,7 +23,7 @@ from pop_ros.frame_work import FrameWork
 from pop_ros.health import NodeHealth
 from pop_ros.inputs import RgbdInputs, RgbdMessages
 from pop_ros.keypoint_sources import reasons
-from pop_ros.node_arguments import SourceArguments
+from pop_ros.node_arguments import NodeArguments
 from pop_ros.node_config import NodeConfig
 from pop_ros.node_outputs import NodeOutputs
 from pop_ros.parameters import ConfigParameters
@@ -45,7 +45,7 @@ class PopNode(LifecycleNode):
     active it subscribes the camera and works for whoever listens.
     """
 
-    def __init__(self, arguments: SourceArguments) -> None:
+    def __init__(self, arguments: NodeArguments) -> None:
         """Declare parameters, topics and services.
 
         Raises:
@@ -92,7 +92,7 @@ class PopNode(LifecycleNode):
         """Configure and activate, unless a manager of life cycles is to do it.
 
         Raises:
-            PopError: If the keypoint source is not there.
+            PopError: If keypoint source, body or library cannot be read.
         """
         if not self.config.autostart:
             self.log.info('unconfigured: waiting for a manager of life cycles')
@@ -110,9 +110,10 @@ class PopNode(LifecycleNode):
     # Life cycle; rclpy takes an exception for an error and says nothing of it.
 
     def on_configure(self, _state: LifecycleState) -> TransitionCallbackReturn:
-        """Check the keypoint source, then load and compile in the worker's thread."""
+        """Check source, body and library, then load and compile in the worker's thread."""
         try:
-            detector = self._arguments.detector()
+            detector = self._arguments.sources.detector()
+            self._arguments.models.check()
         except PopError as error:
             self.refusal = error
             self.log.error(f'not configured: {error}')

@@ -16,7 +16,6 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
@@ -24,10 +23,7 @@ from threadpoolctl import ThreadpoolController
 
 from pop_core.config import PipelineConfig
 from pop_core.errors import PopError
-from pop_core.keypoints.detection import Detection
-from pop_core.pipeline import BodyPipeline
-from pop_core.rgbd import RgbdFrame
-from pop_ros.sources import make_pipeline
+from pop_ros.fitting import Fitting
 
 AnswerT = TypeVar('AnswerT')
 FITTING_NICENESS = 10  # where processors are scarce those who are followed go first
@@ -40,38 +36,17 @@ AUTOGROUP, AUTOGROUP_TRIES = Path('/proc/self/autogroup'), 30
 ORPHAN_S = 1.0  # from one look at whether the node still runs to the next
 STOPPED = 'the process that finds people was stopped'
 Equip = Callable[[PipelineConfig], Any]
+FITTING = Fitting()
 
 
 class FindingError(PopError):
     """The process that finds people ended, or is none to be had."""
 
 
-class Nobody:
-    """A keypoint source for a pipeline that is given its detections."""
-
-    def detect(self, _frame: RgbdFrame) -> list[Detection]:
-        """Return no people."""
-        return []
-
-
-@lru_cache(maxsize=1)
-def _loaded() -> BodyPipeline:
-    return make_pipeline(Nobody())
-
-
-@lru_cache(maxsize=1)
-def fitting_pipeline(config: PipelineConfig) -> BodyPipeline:
-    """Return a pipeline that fits people who are already detected."""
-    loaded = _loaded()
-    return BodyPipeline(loaded.model, loaded.library, Nobody(), config, loaded.fitter.prior)
-
-
 class FindingProcess:
     """A process with what it works with; one that ended is replaced for the next person."""
 
-    def __init__(
-        self, equip: Equip = fitting_pipeline, niceness: int = FITTING_NICENESS
-    ) -> None:
+    def __init__(self, equip: Equip = FITTING, niceness: int = FITTING_NICENESS) -> None:
         """Start nothing yet.
 
         Args:

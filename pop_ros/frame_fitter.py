@@ -17,6 +17,7 @@ from pop_core.tracking.tracker import BodyTracker
 from pop_ros.body_messages import RECORDED_TYPES, BodyMessages, Output
 from pop_ros.frame_maker import FrameMaker
 from pop_ros.keypoint_sources import apply_settings
+from pop_ros.model_files import PACKAGED, ModelFiles
 from pop_ros.node_config import NodeConfig
 from pop_ros.sources import make_pipeline
 from pop_ros.static_frames import StaticFrames, parse_extrinsics
@@ -48,6 +49,7 @@ class FrameFitter:
         progress: Callable[[float, str], None] | None = None,
         frames: StaticFrames | None = None,
         *,
+        models: ModelFiles = PACKAGED,
         finding: Background | None = None,
         looking: Background | None = None,
         searching: Background | None = None,
@@ -60,6 +62,7 @@ class FrameFitter:
             config: Settings of messages and of the tracker.
             progress: Told a share 0..1 and a sentence while a first library is generated.
             frames: Knows where a depth camera with a frame of its own stands.
+            models: Files of body model and pose library.
             finding: Finds people anew while others are followed; None lets frames wait.
             looking: Asks the keypoint source while people are followed; None lets frames wait.
             searching: Looks for lost limbs while people are followed; None lets frames wait.
@@ -68,7 +71,8 @@ class FrameFitter:
             PopError: If one of them cannot be loaded.
         """
         apply_settings(detector, pipeline_config)
-        self._pipeline = make_pipeline(detector, pipeline_config, progress=progress)
+        self._pipeline = make_pipeline(
+            detector, pipeline_config, models.body, models.library, progress)
         self._tracker = BodyTracker(
             self._pipeline, config.tracking, finding, looking, searching)
         self._messages = BodyMessages(self._pipeline.model, config)

@@ -13,11 +13,12 @@ from rclpy.task import Future
 from pop_core.config import PipelineConfig
 from pop_core.errors import PopError
 from pop_ros.finding_process import FindingProcess
+from pop_ros.fitting import Fitting
 from pop_ros.frame_fitter import FittedFrame, FrameFitter
 from pop_ros.from_messages import stamp_ns
 from pop_ros.inputs import RgbdMessages
 from pop_ros.looking import LOOKING_NICENESS, DistantDetector, Looking
-from pop_ros.node_arguments import SourceArguments
+from pop_ros.node_arguments import NodeArguments
 from pop_ros.node_config import NodeConfig
 from pop_ros.node_outputs import NodeOutputs
 from pop_ros.parameters import ConfigParameters
@@ -42,7 +43,7 @@ class FrameWork:
     """
 
     def __init__(
-        self, node: Node, settings: Settings, sources: SourceArguments, frames: StaticFrames,
+        self, node: Node, settings: Settings, arguments: NodeArguments, frames: StaticFrames,
         outputs: NodeOutputs, statistics: NodeStatistics,
     ) -> None:
         """Start to prepare: load the library and compile kernels, in the worker's thread."""
@@ -55,8 +56,10 @@ class FrameWork:
         self._latest: FittedFrame | None = None
         self._last_number = 0
         self._said_share = -1.0
-        self._finding, self._searching = FindingProcess(), FindingProcess()
-        self._looking = FindingProcess(Looking(sources), LOOKING_NICENESS)
+        self._models = arguments.models
+        self._finding = FindingProcess(Fitting(arguments.models))
+        self._searching = FindingProcess(Fitting(arguments.models))
+        self._looking = FindingProcess(Looking(arguments.sources), LOOKING_NICENESS)
         self._worker: Worker[RgbdMessages] = Worker(
             self._fit, self._on_error, lambda: self._prepare(frames))
         self._worker.start()
@@ -128,8 +131,8 @@ class FrameWork:
             'ones read them from the cache')
         fitter = FrameFitter(
             DistantDetector(self._looking), self._settings.pipeline_config,
-            self._settings.node_config, self._say_progress, frames, finding=self._finding,
-            looking=self._looking, searching=self._searching)
+            self._settings.node_config, self._say_progress, frames, models=self._models,
+            finding=self._finding, looking=self._looking, searching=self._searching)
         self._outputs.publish_model(fitter.model)
         self._configure_finding()
         source.result()

@@ -11,7 +11,7 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from pop_ros.node_arguments import SourceArguments
+    from pop_ros.node_arguments import NodeArguments
 
 OK, FAILED, BAD_USAGE = 0, 1, 2
 # The worker lets go of the interpreter for each kernel, and would wait ten times as long (Python's
@@ -42,12 +42,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     rclpy.init(
         args=argv + arguments.as_remappings(), signal_handler_options=SignalHandlerOptions.NO)
     try:
-        return _run(arguments.sources, stopping)
+        return _run(arguments, stopping)
     finally:
         rclpy.try_shutdown()  # type: ignore[attr-defined]
 
 
-def _run(arguments: SourceArguments, stopping: threading.Event) -> int:
+def _run(arguments: NodeArguments, stopping: threading.Event) -> int:
     from rclpy.executors import SingleThreadedExecutor
 
     from pop_core.errors import PopError

@@ -1,4 +1,4 @@
-"""What the node is told on its command line beside ROS arguments: keypoints and camera."""
+"""What the node is told on its command line beside ROS arguments: keypoints, body, camera."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pop_ros.camera_presets import CAMERA_PRESETS, camera_preset
-from pop_ros.sources import make_detector
+from pop_ros.keypoint_sources import make_detector
+from pop_ros.model_files import PACKAGED, ModelFiles
 
 if TYPE_CHECKING:
     from pop_core.keypoints.detection import KeypointDetector
@@ -59,11 +60,18 @@ class NodeArguments:
 
     Args:
         sources: Where keypoints come from.
+        models: Files of body model and pose library.
         camera: Preset of a camera driver whose topics are read, or None.
     """
 
     sources: SourceArguments
+    models: ModelFiles = PACKAGED
     camera: str | None = None
+
+    def as_flags(self) -> list[str]:
+        """Return the flags that give these arguments."""
+        camera = [] if self.camera is None else ['--camera', self.camera]
+        return [*self.sources.as_flags(), *self.models.as_flags(), *camera]
 
     def as_remappings(self) -> list[str]:
         """Return the ROS arguments that connect the inputs to the camera's topics.
@@ -94,9 +102,16 @@ def parse_arguments(arguments: Sequence[str]) -> NodeArguments:
     parser.add_argument(
         '--decoder', metavar='NAME', help='decoder of a network whose outputs do not tell')
     parser.add_argument(
+        '--body', type=Path, metavar='FILE',
+        help='body model that is fitted, made by "pop body import" of your SMPL, SMPL-H, SMPL-X '
+             'or STAR file; without it, the default body')
+    parser.add_argument(
+        '--library', type=Path, metavar='FILE',
+        help='pose library made by "pop library build"; without it, the default one')
+    parser.add_argument(
         '--camera', choices=sorted(CAMERA_PRESETS),
         help='read the topics of this driver; remappings given beside it win')
     found = parser.parse_args(arguments)
     keypoints = ','.join(found.keypoints or ['depth'])
     sources = SourceArguments(keypoints, found.keypoints_dir, found.decoder)
-    return NodeArguments(sources, found.camera)
+    return NodeArguments(sources, ModelFiles(found.body, found.library), found.camera)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from pop_ros.replay_settings import ReplaySettings
 
 ENDED_BY_CTRL_C = 130  # as a shell counts it
 
@@ -41,6 +45,14 @@ def replay(
         '--keypoints-dir', help='Folder of <stamp_ns>.json files.')] = None,
     decoder: Annotated[str | None, typer.Option(
         '--decoder', help='Decoder of a network whose outputs do not tell.')] = None,
+    body: Annotated[Path | None, typer.Option(
+        '--body', metavar='FILE', help='Body model made by "pop body import".')] = None,
+    library: Annotated[Path | None, typer.Option(
+        '--library', metavar='FILE', help='Pose library made by "pop library build".')] = None,
+    settings: Annotated[list[str] | None, typer.Option(
+        '--set', metavar='NAME=VALUE',
+        help='Change a setting of the pipeline or of the node, as in docs/parameters.md and '
+             'docs/ros_api.md; may be repeated.')] = None,
     color: Annotated[str | None, typer.Option('--color', help='Colour topic.')] = None,
     depth: Annotated[str | None, typer.Option('--depth', help='Registered depth topic.')] = None,
     info: Annotated[str | None, typer.Option('--info', help='CameraInfo of colour.')] = None,
@@ -86,10 +98,16 @@ def replay(
       pop replay a.mcap b.mcap --out bodies --start 60 --duration 10
       --loop --clock
 
+    With your SMPL file, imported once by pop body import, and each frame for itself:
+
+      pop replay recording.bag --out bodies --every-frame --body smpl.npz
+      --set tracking.enabled=false
+
     A damaged bag is replayed as far as it can be read. Exit code 1 says that no frame was fitted.
     """
     from pop_ros.bag_merge import BagPart
     from pop_ros.dds_profile import use_large_shared_memory
+    from pop_ros.model_files import ModelFiles
     from pop_ros.node_arguments import SourceArguments
     from pop_ros.replay_pace import Pace
     from pop_ros.replay_session import ReplayRequest, run_replay
@@ -97,19 +115,26 @@ def replay(
     if every_frame and (loop or step or clock or node_running):
         raise typer.BadParameter(
             '--loop, --step, --clock and --node-running play to a node: leave --every-frame away')
+    if node_running and (body or library or settings):
+        raise typer.BadParameter(
+            '--body, --library and --set are for the node that is started: give them to the one '
+            'that runs (pop node --body FILE, ros2 param set /pop NAME VALUE), or leave '
+            '--node-running away')
     if overlays and pictures is None:
         raise typer.BadParameter('--overlays needs a folder: name it with --pictures')
     if rerun is not None:
         from pop_ros.rerun_export import rerun_sdk
 
         rerun_sdk()  # a missing one is told before the work is done
+    chosen = _settings(settings or [], draws=pictures is not None or rerun is not None)
     use_large_shared_memory()
     request = ReplayRequest(
         bags=tuple(bags), out=out, ros1=ros1,
         sources=SourceArguments(','.join(keypoints), keypoints_dir, decoder),
         topics=(color, depth, info), slop_s=slop, every_frame=every_frame,
         node_running=node_running, pace=Pace(rate, loop, step, clock),
-        part=BagPart(start, duration), storage=storage.value, inputs=inputs)
+        part=BagPart(start, duration), storage=storage.value, inputs=inputs,
+        models=ModelFiles(body, library), settings=chosen)
     summary = run_replay(request, typer.echo)
     typer.echo(summary.text())
     typer.echo(f'results: {out}{f" and {ros1}" if ros1 else ""}')
@@ -121,3 +146,14 @@ def replay(
         from pop_ros.show_command import draw_replay
 
         draw_replay(request, pictures, rerun, summary.text().splitlines(), overlays=overlays)
+
+
+def _settings(flags: Sequence[str], *, draws: bool) -> ReplaySettings:
+    """Return the settings that were given; what is to be drawn must be recorded."""
+    from pop_ros.replay_settings import ReplaySettings
+
+    settings = ReplaySettings.of_flags(flags)
+    if draws and settings.node.mesh.detail != 'full':
+        raise typer.BadParameter(
+            '--pictures and --rerun draw full meshes: leave --set mesh.detail away')
+    return settings

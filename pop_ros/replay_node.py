@@ -7,7 +7,8 @@ import subprocess
 import sys
 
 from pop_core.errors import PopError
-from pop_ros.node_arguments import SourceArguments
+from pop_ros.node_arguments import NodeArguments
+from pop_ros.replay_settings import SLOP, ReplaySettings
 
 STOP_S = 15.0
 
@@ -20,12 +21,13 @@ class NodeProcess:
     """The node in a process of its own."""
 
     def __init__(
-        self, sources: SourceArguments, slop_s: float, *, use_sim_time: bool = False
+        self, arguments: NodeArguments, settings: ReplaySettings, slop_s: float, *,
+        use_sim_time: bool = False,
     ) -> None:
         """Start it; it inherits the environment, so both sides share domain and RMW."""
         command = [
-            sys.executable, '-m', 'pop_ros.node', *sources.as_flags(),
-            '--ros-args', '-p', f'sync.slop_s:={slop_s:.9f}']
+            sys.executable, '-m', 'pop_ros.node', *arguments.as_flags(), '--ros-args',
+            *settings.as_ros_arguments(), '-p', f'{SLOP}:={slop_s:.9f}']
         if use_sim_time:
             command += ['-p', 'use_sim_time:=true']
         # A group of its own: Ctrl-C ends the replay, which lets the node finish its frame.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -11,20 +10,20 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from pop_core.config import PipelineConfig
 from pop_ros.bag_merge import BagPart, MergedBags
 from pop_ros.bag_topics import RgbdTopics, find_topics
 from pop_ros.bag_writer import BagWriter
 from pop_ros.frame_fitter import FrameFitter
-from pop_ros.keypoint_sources import make_detector, reasons
-from pop_ros.node_arguments import SourceArguments
-from pop_ros.node_config import NodeConfig
+from pop_ros.keypoint_sources import reasons
+from pop_ros.model_files import PACKAGED, ModelFiles
+from pop_ros.node_arguments import NodeArguments, SourceArguments
 from pop_ros.recording import Recording
 from pop_ros.replay import ReplaySummary, replay_every_frame
 from pop_ros.replay_dds import READY_S, DdsPlayer, bag_transports
 from pop_ros.replay_inputs import CopiedInputs
 from pop_ros.replay_node import NodeProcess
 from pop_ros.replay_pace import Pace
+from pop_ros.replay_settings import ReplaySettings
 
 RUNNING_NODE_S = 30.0
 STEP_KEYS = 'Enter shows the next frame, Ctrl-D plays on to the end, Ctrl-C ends'
@@ -48,6 +47,8 @@ class ReplayRequest:
         part: Part of the recording to replay.
         storage: Storage of the rosbag2: 'mcap' or 'sqlite3'.
         inputs: Whether to copy the camera's messages and the transforms into the results.
+        models: Files of body model and pose library.
+        settings: Settings of the pipeline, and of the node.
     """
 
     bags: tuple[Path, ...]
@@ -62,13 +63,16 @@ class ReplayRequest:
     part: BagPart = field(default_factory=BagPart)
     storage: str = 'mcap'
     inputs: bool = False
+    models: ModelFiles = PACKAGED
+    settings: ReplaySettings = field(default_factory=ReplaySettings)
 
 
 def run_replay(request: ReplayRequest, say: Callable[[str], None]) -> ReplaySummary:
     """Replay a recording and return what came of it.
 
     Raises:
-        PopError: If the bags, the topics, the keypoint source or the outputs do not allow it.
+        PopError: If the bags, the topics, the keypoint source, the body, the library
+            or the outputs do not allow it.
     """
     with MergedBags(request.bags, request.part) as bag:
         topics = find_topics(bag, *request.topics)
@@ -106,7 +110,8 @@ def _every_frame(
     detector = request.sources.detector()
     for reason in reasons(detector):
         say(reason)
-    fitter = FrameFitter(detector, PipelineConfig(), NodeConfig())
+    fitter = FrameFitter(
+        detector, request.settings.pipeline, request.settings.node, models=request.models)
     with writer:
         return replay_every_frame(
             _read(request, bag, topics, writer), topics, fitter, writer, slop_s=request.slop_s,
@@ -127,10 +132,12 @@ def _over_dds(
     summary = ReplaySummary()
     writer = BagWriter(request.out, request.ros1, request.storage)
     if not request.node_running:
-        # A source that does not exist is refused here, before a node starts.
-        make_detector(*dataclasses.astuple(request.sources))
+        # A source or a file that does not exist is refused here, before a node starts.
+        request.sources.detector()
+        request.models.check()
     node = None if request.node_running else NodeProcess(
-        request.sources, request.slop_s, use_sim_time=request.pace.clock)
+        NodeArguments(request.sources, request.models), request.settings, request.slop_s,
+        use_sim_time=request.pace.clock)
     check = (lambda: None) if node is None else node.check
     try:
         with DdsPlayer(bag_transports(bag, topics), check, request.pace) as player:

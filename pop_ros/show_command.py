@@ -29,7 +29,8 @@ def show(
     film: Annotated[str, typer.Option(
         '--film', help='Name of the film: .mp4, .webp or .gif.')] = 'film.mp4',
     body: Annotated[Path | None, typer.Option(
-        '--body', help='Body model that was fitted, if not the default one.')] = None,
+        '--body', metavar='FILE',
+        help='Body model that was fitted (--body of the replay), if not the default one.')] = None,
     color: Annotated[str | None, typer.Option('--color', help='Colour topic.')] = None,
     depth: Annotated[str | None, typer.Option('--depth', help='Registered depth topic.')] = None,
     info: Annotated[str | None, typer.Option('--info', help='CameraInfo of colour.')] = None,
@@ -45,14 +46,12 @@ def show(
 
       pop show bodies bodies --out look --overlays
     """
-    from pop_core.body.default_body import default_body
-    from pop_core.body.model_file import load_body_model
+    from pop_ros.model_files import ModelFiles
     from pop_ros.show_recording import ShowRequest
 
     if out is None and rerun is None:
         raise typer.BadParameter('expected --out, --rerun or both, found neither')
-    model = default_body() if body is None else load_body_model(body)
-    _draw(model, rerun, out, ShowRequest(
+    _draw(ModelFiles(body).load_body(), rerun, out, ShowRequest(
         recordings=tuple(recording), bodies=bodies, out=out or Path(), topics=(color, depth, info),
         slop_s=slop, film=film, overlays=overlays))
 
@@ -62,10 +61,9 @@ def draw_replay(
     *, overlays: bool,
 ) -> None:
     """Draw what a replay has just recorded, with what it said."""
-    from pop_core.body.default_body import default_body
     from pop_ros.show_recording import ShowRequest
 
-    _draw(default_body(), rerun, out, ShowRequest(
+    _draw(replayed.models.load_body(), rerun, out, ShowRequest(
         recordings=replayed.bags, bodies=replayed.out, out=out or Path(), topics=replayed.topics,
         slop_s=replayed.slop_s, notes=notes, overlays=overlays))
 

@@ -175,8 +175,8 @@ def _bodies(
         if len(corners) != model.f.size:
             raise ShowError(
                 f'{request.bodies}: expected meshes of {len(model.f)} triangles, found '
-                f'{len(corners) // 3}: name the body they were made with (--body), and record '
-                'with mesh.detail full')
+                f'{len(corners) // 3}: name the body they were made with (pop show '
+                '--body FILE), and record with mesh.detail full')
     return shown_bodies(recorded, frame, model)
 
 

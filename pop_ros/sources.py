@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pop_ros.keypoint_sources import SOURCES, SourceError, apply_settings, make_detector
+from pop_ros.model_files import ModelFiles
 
 if TYPE_CHECKING:
     from pop_core.config import PipelineConfig
@@ -37,15 +38,10 @@ def make_pipeline(
 
     Raises:
         SourceError: If the detector is none.
-        PopError: If a file is damaged or not of its format.
+        PopError: If a file is missing, damaged or not of its format.
     """
-    from pop_core.body.default_body import default_body
-    from pop_core.body.model_file import load_body_model
     from pop_core.keypoints.detection import KeypointDetector
     from pop_core.pipeline import BodyPipeline
-    from pop_core.retrieval.default_library import default_library
-    from pop_core.retrieval.library_file import load_library
-    from pop_core.retrieval.pose_library import on_body
     from pop_ros.kernel_cache import look_at_kernels
     from pop_ros.warm_up import warm_up
 
@@ -53,11 +49,10 @@ def make_pipeline(
         raise SourceError(
             "pipeline: expected a detector with detect(frame), as make_detector('depth') makes, "
             f'found {detector!r}')
-    model = default_body() if body_file is None else load_body_model(body_file)
-    told = None if progress is None else _as_counter(progress)
-    library = default_library(told) if library_file is None else load_library(library_file)
-    if body_file is not None:
-        library = on_body(library, model)
+    models = ModelFiles(
+        *(None if file is None else Path(file) for file in (body_file, library_file)))
+    model = models.load_body()
+    library = models.load_library(model, None if progress is None else _as_counter(progress))
     if progress is not None and (missing := look_at_kernels().missing):
         progress(0.0, f'compiling kernels of {len(missing)} modules: about a minute, once')
     if config is not None:

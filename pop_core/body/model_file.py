@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,11 @@ ARRAY_NAMES = tuple(name for name in AXES if name != 'posedirs')
 IMPORT_HINT = 'convert SMPL, SMPL-H, SMPL-X and STAR files with `pop body import`'
 # float32 sums of a few hundred terms, and files written with four decimals.
 WEIGHT_SUM_TOLERANCE = 1e-3
+# What numpy raises for a file that is no npz archive (a single array among them), and for one that
+# is damaged: in its data, in its directory, or where an entry says how it is packed.
+NO_ARCHIVE = (
+    OSError, ValueError, EOFError, AttributeError, TypeError, RuntimeError, zipfile.BadZipFile,
+    zlib.error)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,7 +143,7 @@ def _read_arrays(path: Path) -> dict[str, np.ndarray]:
             return {name: archive[name] for name in archive.files}
     except FileNotFoundError as error:
         raise ModelFileError(f'{path}: expected a body model file, found nothing') from error
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+    except NO_ARCHIVE as error:
         raise ModelFileError(
             f'{path}: expected an npz archive of plain arrays, found another or a damaged file, '
             f'or pickled objects; {IMPORT_HINT}'

@@ -6,7 +6,6 @@ Loper et al. 2015 (SMPL), Romero et al. 2017 (SMPL-H), Pavlakos et al. 2019 (SMP
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ from pop_core.body.captured_arrays import dense_array
 from pop_core.body.decimation import decimate
 from pop_core.body.joints import JOINT_INDEX, N_JOINTS, PARENTS
 from pop_core.body.model import BodyModel
-from pop_core.body.model_file import check_body_model
+from pop_core.body.model_file import NO_ARCHIVE, check_body_model
 from pop_core.body.restricted_unpickler import load_restricted_pickle
 from pop_core.errors import ModelFileError
 
@@ -115,7 +114,7 @@ def _load_npz(path: Path) -> dict[str, Any]:
             # SMPL-X also holds pickled dictionaries: they are not needed and never opened.
             names = [name for name in (*NEEDED, 'posedirs') if name in archive.files]
             return {name: archive[name] for name in names}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+    except NO_ARCHIVE as error:
         # numpy's own message would advise to allow pickles.
         raise ModelFileError(
             f'{path}: expected an npz archive of plain arrays, found none, a damaged one, or '

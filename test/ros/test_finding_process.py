@@ -15,6 +15,7 @@ from support.faults import fail_in_two_parts, take_for_ever
 from support.lost_limb import lost_limbs, raised
 from support.node import ROOT
 from support.one_person import facing_person
+from support.smpl_body import SPLIT, imported_body
 from support.stage import Stage
 
 from pop_core.body.default_body import default_body
@@ -22,14 +23,19 @@ from pop_core.config import PipelineConfig
 from pop_core.depth_noise import USUAL_NOISE
 from pop_core.estimate import EstimateStatus
 from pop_core.keypoints.detection import Detection
-from pop_core.pipeline import Scene
+from pop_core.pipeline import BodyPipeline, Scene
+from pop_core.retrieval.default_library import default_library
+from pop_core.retrieval.library_file import save_library
 from pop_core.tracking.finder import find_person
 from pop_core.tracking.late_limbs import LimbQuestion, find_limbs
 from pop_core.tracking.tracking_config import TrackingConfig
 from pop_ros import finding_process
 from pop_ros.finding_process import FITTING_NICENESS, FindingError, FindingProcess
+from pop_ros.fitting import Fitting
+from pop_ros.model_files import ModelFiles
 
 WAIT_S = 120.0
+FEW_POSES = 20_000
 
 
 @pytest.fixture(scope='module')
@@ -75,6 +81,26 @@ def test_it_finds_whom_the_node_itself_would_find_with_the_settings_of_the_momen
     np.testing.assert_array_equal(there.body.hessian, here.body.hessian)
     finding.configure(PipelineConfig(max_range_m=1.0))
     assert finding.submit(find_person, *seen).result(WAIT_S).status is EstimateStatus.TOO_FAR
+
+
+def test_it_fits_the_body_and_the_poses_that_the_node_fits(
+    seen: tuple[Scene, Detection], tmp_path: Path
+) -> None:
+    save_library(default_library().subset(np.arange(FEW_POSES)), tmp_path / 'few.poplib')
+    fitting = Fitting(ModelFiles(imported_body(tmp_path), tmp_path / 'few.poplib'))
+    finding = FindingProcess(fitting)
+    try:
+        assert finding.submit(pose_count).result(WAIT_S) == FEW_POSES
+        there = finding.submit(find_person, *seen).result(WAIT_S)
+    finally:
+        finding.stop()
+    here = find_person(fitting(PipelineConfig()), *seen)
+    np.testing.assert_array_equal(there.estimate.vertices, here.estimate.vertices)
+    assert len(there.estimate.vertices) == len(default_body().v_template) + SPLIT
+
+
+def pose_count(pipeline: BodyPipeline) -> int:
+    return len(pipeline.library)
 
 
 def test_limbs_looked_for_there_are_those_found_here(

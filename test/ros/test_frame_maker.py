@@ -13,7 +13,7 @@ from pop_core.config import PipelineConfig
 from pop_core.errors import SettingError
 from pop_core.geometry.camera import Camera
 from pop_core.geometry.transform import invert_transform, make_transform
-from pop_ros.finding_process import Nobody
+from pop_ros.fitting import Nobody
 from pop_ros.frame_fitter import FrameFitter
 from pop_ros.frame_maker import FrameMaker
 from pop_ros.message_error import BadMessageError

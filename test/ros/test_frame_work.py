@@ -19,7 +19,7 @@ from pop_ros import looking
 from pop_ros.frame_fitter import FrameFitter
 from pop_ros.frame_work import FrameWork
 from pop_ros.inputs import RgbdMessages
-from pop_ros.node_arguments import SourceArguments
+from pop_ros.node_arguments import NodeArguments, SourceArguments
 from pop_ros.node_config import NodeConfig
 from pop_ros.node_outputs import NodeOutputs
 from pop_ros.parameters import ConfigParameters
@@ -36,8 +36,8 @@ def prepared(
     statistics = NodeStatistics()
     settings = ConfigParameters(node, NodeConfig(lazy=False), PipelineConfig(), lambda: None)
     work = FrameWork(
-        node, settings, SourceArguments('json', keypoints), StaticFrames(), NodeOutputs(node),
-        statistics)
+        node, settings, NodeArguments(SourceArguments('json', keypoints)), StaticFrames(),
+        NodeOutputs(node), statistics)
     return work, statistics
 
 

@@ -18,6 +18,7 @@ from support.node import ROOT, RunningNode
 from pop_core.config import PipelineConfig
 from pop_core.settings import apply_settings, list_settings
 from pop_ros.camera_presets import CAMERA_PRESETS
+from pop_ros.model_files import ModelFiles
 from pop_ros.node_arguments import parse_arguments
 from pop_ros.node_config import NodeConfig
 
@@ -79,6 +80,14 @@ def test_a_camera_s_topics_become_the_node_s_inputs(
         'color/camera_info': topics.info}
     assert parse_arguments(node.arguments).sources.keypoints == 'network.onnx'
     assert (node.package, node.executable, node.name) == ('pop_ros', 'pop_node', 'pop')
+
+
+def test_body_and_library_become_the_node_s(launch_file: ModuleType) -> None:
+    _, (node,) = perform(launch_file, body='/my/smpl.npz', library='/my/all.poplib')
+    files = ModelFiles(Path('/my/smpl.npz'), Path('/my/all.poplib'))
+    assert parse_arguments(node.arguments).models == files
+    _, (node,) = perform(launch_file)
+    assert parse_arguments(node.arguments).models == ModelFiles()
 
 
 def test_topics_named_by_hand_win_over_the_camera_s(launch_file: ModuleType) -> None:

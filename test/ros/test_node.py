@@ -270,6 +270,8 @@ def test_the_node_ends_cleanly_on_sigterm_while_it_prepares(recording: Recording
     (['--ros-args', '-p', 'mesh.detail:=huge'], 'expected one of full, reduced, off'),
     (['--keypoints', 'json', '--keypoints-dir', '/nowhere'], '/nowhere'),
     (['--keypoints', 'none.onnx'], 'none.onnx'),
+    (['--body', __file__], 'expected an npz archive'),
+    (['--library', __file__], 'expected a pose library'),
 ])
 def test_a_bad_setting_ends_the_node_with_a_sentence(arguments: list[str], told: str) -> None:
     running = RunningNode(*arguments)

@@ -135,15 +135,18 @@ def test_without_subscribers_the_camera_is_left_alone_and_qos_is_the_user_s(
     assert running.end() == 0
 
 
-def test_configuring_without_keypoints_fails_with_a_sentence_and_the_node_stays(
-    start: Callable[..., RunningNode]
+@pytest.mark.parametrize(('arguments', 'told'), [
+    (['--keypoints', 'json', '--keypoints-dir', '/nowhere'], 'keypoints: expected a folder'),
+    (['--body', '/nowhere.npz'], '/nowhere.npz: expected a body model file'),
+])
+def test_configuring_without_a_file_fails_with_a_sentence_and_the_node_stays(
+    start: Callable[..., RunningNode], arguments: list[str], told: str
 ) -> None:
-    running = start('--keypoints', 'json', '--keypoints-dir', '/nowhere',
-                          '--ros-args', '-p', 'autostart:=false')
+    running = start(*arguments, '--ros-args', '-p', 'autostart:=false')
     with Player() as player:
         assert not change(player, 'configure')
         assert state(player) == 'unconfigured'
-        running.wait_for('not configured: keypoints: expected a folder')
+        running.wait_for(f'not configured: {told}')
     assert running.end() == 0
 
 

@@ -151,7 +151,8 @@ def write_python2_pickle(path: Path, content: object) -> Path:
 
 def write_smpl_pickle(path: Path, arrays: dict[str, np.ndarray]) -> Path:
     """Write basicmodel_*_lbs_10_207_0_*.pkl: chumpy arrays and sparse regressors."""
-    full = np.concatenate([arrays['shapedirs'], np.zeros((N_VERTICES, 3, 5))], axis=2)
+    vertices = len(arrays['v_template'])
+    full = np.concatenate([arrays['shapedirs'], np.zeros((vertices, 3, 5))], axis=2)
     picked = np.arange(full.size).reshape(full.shape)[:, :, : arrays['shapedirs'].shape[2]]
     content = {
         **arrays,
@@ -161,6 +162,6 @@ def write_smpl_pickle(path: Path, arrays: dict[str, np.ndarray]) -> Path:
         'J_regressor_prior': CscMatrix(arrays['J_regressor']),
         'bs_style': 'lbs',
         'bs_type': 'lrotmin',
-        'vert_sym_idxs': np.arange(N_VERTICES),
+        'vert_sym_idxs': np.arange(vertices),
     }
     return write_python2_pickle(path, content)

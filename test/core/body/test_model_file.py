@@ -1,3 +1,5 @@
+import io
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -147,3 +149,21 @@ def test_no_file_and_no_archive_are_named(tmp_path: Path) -> None:
         damaged.write_bytes(content)
         with pytest.raises(ModelFileError, match=r'damaged\.npz'):
             load_body_model(damaged)
+
+
+def test_damage_inside_an_archive_and_a_single_array_are_named(tmp_path: Path) -> None:
+    sound = DEFAULT_BODY_FILE.read_bytes()
+    with zipfile.ZipFile(DEFAULT_BODY_FILE) as archive:
+        packed = archive.getinfo('v_template.npy')
+    names = sound.index(b'v_template.npy', packed.header_offset) + len(packed.filename)
+    extra = int.from_bytes(sound[packed.header_offset + 28:packed.header_offset + 30], 'little')
+    data, directory = bytearray(sound), bytearray(sound)
+    data[names + extra] = 0xff  # no kind of deflated block
+    directory[sound.index(b'PK\x01\x02') + 10] = 99  # no way to compress
+    alone = io.BytesIO()
+    np.save(alone, np.zeros(3))
+    path = tmp_path / 'body.npz'
+    for content in (data, directory, alone.getvalue()):
+        path.write_bytes(content)
+        with pytest.raises(ModelFileError, match=r'body\.npz: expected an npz archive'):
+            load_body_model(path)
