@@ -30,7 +30,11 @@ app = typer.Typer(
 
 
 @app.command('list')
-def list_networks() -> None:
+def list_networks(
+    urls: Annotated[bool, typer.Option(
+        '--urls', help='Also say where each is downloaded from, its SHA-256, and who says so.',
+    )] = False,
+) -> None:
     """List the networks that can be named after --keypoints, and which of them are here.
 
     Their weights belong to their publishers: mind the licence.
@@ -45,6 +49,13 @@ def list_networks() -> None:
             entry.name, size, entry.licence, entry.decoder, _state(entry), entry.about)
     console = Console()
     console.print(table)
+    if urls:
+        for entry in load_registry():
+            sha256 = entry.sha256 or 'not published: give it with --sha256'
+            evidence = f', from the {entry.evidence}' if entry.evidence else ''
+            console.print(
+                f'\n{entry.name}\n  {entry.url}\n  SHA-256 {sha256}{evidence}',
+                highlight=False, markup=False, soft_wrap=True)
     console.print(f'\nFetched networks lie in {networks_folder()}.', highlight=False)
 
 

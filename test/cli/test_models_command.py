@@ -11,7 +11,7 @@ import pytest
 from onnx import helper, numpy_helper
 from support.onnx_files import KINDS, save_graph, save_network
 
-from pop_ros.network_registry import known_entry, networks_folder, save_record
+from pop_ros.network_registry import known_entry, load_registry, networks_folder, save_record
 
 ROOT = Path(__file__).resolve().parents[2]
 PEOPLE = {'dets': np.zeros((1, 4, 5), np.float32),
@@ -45,6 +45,13 @@ def test_the_list_says_what_is_here_and_what_lacks_a_hash():
     assert ' no ' in state['rtmo-m']
     assert 'needs --sha256' in state['rtmpose-m']
     assert 'Apache-2.0' in state['rtmo-m']
+
+
+def test_the_long_list_says_where_networks_come_from_and_what_they_hash_to():
+    said = pop('list', '--urls')
+    for entry in load_registry():
+        assert entry.url in said
+        assert (entry.sha256 or 'give it with --sha256') in said
 
 
 def test_check_says_how_a_file_is_read_what_it_hashes_to_and_how_long_it_takes(tmp_path):
