@@ -18,6 +18,7 @@ from benchmarks.accuracy_records import CURVE_M, Record, match, observed_points
 from pop_core.body.model import BodyModel
 from pop_core.body.skinning import vertices
 from pop_core.rendering.depth_renderer import render_depth
+from pop_core.rendering.text import captioned
 from pop_core.synthesis.scenes import SyntheticScene, synthesise_scene
 from pop_core.synthesis.truth import PersonTruth
 
@@ -71,7 +72,7 @@ def curves_picture(records: Sequence[Record]) -> UInt8[np.ndarray, 'h w 3']:
 def scene_picture(
     model: BodyModel, scene: SyntheticScene, guesses: Sequence[Guess]
 ) -> UInt8[np.ndarray, 'h w 3']:
-    """Return colour, fits over colour (true outlines in green) and error heat maps."""
+    """Return colour, fits over colour (true outlines in green) and error heat maps, captioned."""
     overlay = scene.frame.rgb.copy()
     for person in scene.people:
         outline, _ = cv2.findContours(
@@ -85,7 +86,10 @@ def scene_picture(
         overlay = np.where(covered.covered[..., None], tint, overlay).astype(np.uint8)
     for k, g in pairs.items():
         _draw_heat(heat, model, scene, scene.people[k], guesses[g])
-    return np.hstack([scene.frame.rgb, overlay, heat])
+    _draw_scale(heat)
+    return np.hstack([
+        captioned(scene.frame.rgb, 'colour'), captioned(overlay, 'fits, and true outlines'),
+        captioned(heat, 'measured points, by their distance from the fit')])
 
 
 def _draw_heat(
@@ -100,6 +104,18 @@ def _draw_heat(
     for (u, v), value in zip(scene.frame.camera.project(points), shade, strict=True):
         colour = (int(value), int(value), int(value))
         cv2.rectangle(heat, (int(u) - 1, int(v) - 1), (int(u) + 1, int(v) + 1), colour, -1)
+
+
+def _draw_scale(heat: UInt8[np.ndarray, 'h w 3']) -> None:
+    """Draw a bar of the shades into the lower left corner, with millimetres below."""
+    top, left, width = heat.shape[0] - 34, 8, 150
+    heat[top - 6:, : left + width + 62] = 30
+    shades = np.linspace(255, 0, width).astype(np.uint8)
+    heat[top: top + 10, left: left + width] = shades[None, :, None]
+    for share, more in ((0.0, ''), (0.5, ''), (1.0, ' mm or more')):
+        cv2.putText(
+            heat, f'{1000 * share * BLACK_M:.0f}{more}', (left + int(share * width) - 4, top + 26),
+            cv2.FONT_HERSHEY_SIMPLEX, 0.38, (235, 235, 235), 1, cv2.LINE_AA)
 
 
 def _draw_curve(
