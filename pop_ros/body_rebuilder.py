@@ -32,7 +32,7 @@ class BodyRebuilder:
             f'body_model: expected {self.model.name!r} of digest {self.digest}, which stands '
             f'here, found {message.name!r} of digest {message.digest or "unknown"} with '
             f'{message.vertex_count} vertices: no mesh is shown rather than a wrong one; start '
-            'the viewer with the file of the node\'s model (--model FILE)')
+            'the viewer with the file of the node\'s model (--body FILE)')
 
     def vertices(self, message: Any) -> Float[np.ndarray, 'v 3']:
         """Return the mesh [m] of a pop_msgs/Body in the frame of its message.

@@ -29,7 +29,8 @@ def show(
     film: Annotated[str, typer.Option(
         '--film', help='Name of the film: .mp4, .webp or .gif.')] = 'film.mp4',
     body: Annotated[Path | None, typer.Option(
-        '--body', help='Body model that was fitted, if not the default one.')] = None,
+        '--body', metavar='FILE',
+        help='Body model that was fitted (--body of the replay), if not the default one.')] = None,
     color: Annotated[str | None, typer.Option('--color', help='Colour topic.')] = None,
     depth: Annotated[str | None, typer.Option('--depth', help='Registered depth topic.')] = None,
     info: Annotated[str | None, typer.Option('--info', help='CameraInfo of colour.')] = None,

@@ -34,8 +34,9 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
         formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--node', default='/pop', metavar='NAME',
                         help='full name of the pop node (default: /pop)')
-    parser.add_argument('--model', '--body', type=Path, metavar='FILE',
-                        help='the body model the node fits, where it is not the default body')
+    parser.add_argument('--body', '--model', dest='body', type=Path, metavar='FILE',
+                        help='the body model the node fits (its --body), where it is not the '
+                             'default one')
     parser.add_argument('--detail', choices=[d for d in MESH_DETAILS if d != 'off'],
                         default='full', help='mesh to publish (default: full)')
     parser.add_argument('--lifetime-s', type=float, default=0.0, metavar='SECONDS',
@@ -64,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(found: argparse.Namespace) -> None:
-    model = ModelFiles(found.model).load_body()
+    model = ModelFiles(found.body).load_body()
     config = MeshConfig(detail=found.detail, lifetime_s=found.lifetime_s)
     node = ViewerNode(model, found.node, config)
     executor = SingleThreadedExecutor()

@@ -18,8 +18,8 @@ HEADER = """\
 
 Written by `make docs` from the code; a test keeps it current. Every setting is a ROS parameter of
 the node (`--ros-args -p fitting.surface_hypotheses:=6`); those of the pipeline are also flags of
-`pop fit` (`--set fitting.surface_hypotheses=6`). A value of another type, out of range, or of an
-unknown name is refused with a sentence.
+`pop fit` (`--set fitting.surface_hypotheses=6`), and with those of the node also of `pop replay`.
+A value of another type, out of range, or of an unknown name is refused with a sentence.
 """
 
 

@@ -22,6 +22,7 @@ from visualization_msgs.msg import Marker
 from pop_core.body.default_body import default_body
 from pop_ros.from_messages import stamp_ns
 from pop_ros.recorded_bodies import mesh_vertices
+from pop_ros.viewer_command import parse_arguments
 
 PEOPLE = (3, 8)
 MESH, NODE_MESH = '/pop_viewer/mesh', '/pop/mesh'
@@ -132,6 +133,11 @@ def test_bodies_of_another_model_are_refused_with_a_sentence(watcher: Watcher) -
     assert viewer.end() == 0, viewer.output
     assert watcher.found[MESH] == []
     assert 'start the viewer with the file of the node' in viewer.output
+
+
+@pytest.mark.parametrize('flag', ['--body', '--model'])
+def test_the_node_s_body_is_named_as_for_the_node_or_as_it_used_to_be(flag: str) -> None:
+    assert parse_arguments([flag, 'smpl.npz']).body == Path('smpl.npz')
 
 
 def test_the_rviz_configuration_shows_the_viewer_s_meshes_and_nothing_large_of_the_node() -> None:
