@@ -13,7 +13,7 @@ def demo(
     out: Annotated[Path, typer.Option('--out', help='New folder, or that of an earlier demo.')]
     = Path('demo_output'),
     frames: Annotated[int, typer.Option('--frames', min=1, help='Length of the recording.')] = 16,
-    seed: Annotated[int, typer.Option('--seed', min=0, help='Another person and room.')] = 8,
+    seed: Annotated[int, typer.Option('--seed', min=0, help='Another person and room.')] = 3,
     keypoints: Annotated[str, typer.Option(
         '--keypoints', metavar='SOURCE',
         help='depth: the embedded network, as in "pop node". truth: the drawn joints with the '
