@@ -225,7 +225,7 @@ def summary_of(entries: list[dict[str, Any]], names: list[str]) -> dict[str, Any
 def make_console() -> Console:
     """Return a console wide enough for the table, also where output goes into a file."""
     console = Console(highlight=False, markup=False)
-    return console if console.is_terminal else Console(highlight=False, markup=False, width=130)
+    return console if console.is_terminal else Console(highlight=False, markup=False, width=190)
 
 
 def print_report(report: dict[str, Any], console: Console) -> None:
