@@ -137,7 +137,8 @@ def test_a_process_that_hangs_is_ended_and_replaced(
     with pytest.raises(FindingError, match='ended with code -9 after 0'):
         finding.submit(find_person, *seen).result(WAIT_S)
     assert not is_running(hung)
-    # The first answer of its successor may take as long as loading does.
+    # A busy machine may need longer for the fit of its successor.
+    monkeypatch.setattr(finding_process, 'PATIENCE_S', WAIT_S)
     assert finding.submit(find_person, *seen).result(WAIT_S).status is EstimateStatus.OK
 
 
