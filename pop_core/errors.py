@@ -10,7 +10,7 @@ class FrameError(PopError):
 
 
 class RepeatedStampError(FrameError):
-    """A frame of a sequence whose stamp does not tell it from the one before."""
+    """A frame of a sequence that is less than a millisecond after the one before."""
 
 
 class CameraError(PopError):

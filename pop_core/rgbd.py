@@ -55,10 +55,12 @@ class RgbdFrame:
                 'frame: expected depth in metres and NaN where nothing was measured, found '
                 f'{np.count_nonzero(no_distance)} pixels of 0, below, or infinite: '
                 'pop_core.rgbd.clean_depth makes them NaN')
-        if not isinstance(self.stamp_ns, int | np.integer):
+        if isinstance(self.stamp_ns, bool) or not isinstance(self.stamp_ns, int | np.integer):
             raise FrameError(
                 f'frame: expected stamp_ns as an integer of nanoseconds, found {self.stamp_ns!r}: '
                 'round(1e9 * seconds) converts')
+        # Differences of unsigned stamps would wrap around.
+        object.__setattr__(self, 'stamp_ns', int(self.stamp_ns))
 
 
 def clean_depth(depth_m: Float32[np.ndarray, 'h w']) -> Float32[np.ndarray, 'h w']:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any, TypeVar
 
 from pop_core.errors import SettingError
@@ -82,7 +83,9 @@ def apply_settings(config: ConfigT, values: Mapping[str, Value]) -> ConfigT:
 def check_name(name: str, known: Collection[str]) -> None:
     """Raise SettingError unless a setting of this name is known."""
     if name not in known:
-        raise SettingError(f'{name}: expected one of {sorted(known)}, found an unknown name')
+        near = ', '.join(get_close_matches(name, known)) or 'nothing like it'
+        raise SettingError(
+            f'{name}: expected one of {sorted(known)}, found an unknown name; nearest: {near}')
 
 
 def check_value(item: Setting, value: Value) -> None:

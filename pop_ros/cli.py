@@ -19,7 +19,8 @@ Start with [bold]pop demo[/bold], or fit a frame of your own:
 
   pop fit FRAME --out results
 
-FRAME is a folder with color.png, depth.png (16 bit, millimetres) and camera.json.
+FRAME is a folder with color.png, depth.png (16 bit, millimetres unless camera.json
+has a depth_scale) and camera.json.
 """
 
 

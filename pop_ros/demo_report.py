@@ -51,7 +51,7 @@ def write_demo_report(
     report.heading('What the node said')
     report.commands(summary.text().splitlines())
     report.heading('Look further')
-    report.commands(_commands(paths, keypoints))
+    report.commands(commands(paths, keypoints))
     report.text(f'Written by pop {__version__}.')
     report.write(paths.report)
 
@@ -76,7 +76,8 @@ def _caption(frame: DemoFrame) -> str:
     return ', '.join(parts) + ' in the mean'
 
 
-def _commands(paths: DemoPaths, keypoints: DemoKeypoints) -> list[str]:
+def commands(paths: DemoPaths, keypoints: DemoKeypoints) -> list[str]:
+    """Return what to type to go on with a demo."""
     flags = ' '.join(source_of(DemoPaths(Path()), keypoints).as_flags())
     return [
         f'cd {paths.root.resolve()}',

@@ -23,8 +23,9 @@ BAD_INPUT = 2
 def fit(
     inputs: Annotated[list[Path], typer.Argument(
         metavar='INPUT...',
-        help='Folder with color.png, depth.png (16 bit, mm) and camera.json (here or in its '
-             'parent folder), or a folder of such folders.')],
+        help='Folder with color.png, depth.png (16 bit, mm unless camera.json has a '
+             'depth_scale) and camera.json (here or in its parent folder), or a folder of such '
+             'folders.')],
     out: Annotated[Path, typer.Option('--out', help='Folder for the results.')],
     keypoints: Annotated[list[str] | None, typer.Option(
         '--keypoints', metavar='SOURCE',

@@ -29,7 +29,8 @@ class ModelFiles:
     def __post_init__(self) -> None:
         for name in ('body', 'library'):
             path: Path | None = getattr(self, name)
-            object.__setattr__(self, name, None if path is None else path.absolute())
+            if path is not None:
+                object.__setattr__(self, name, Path(path).expanduser().absolute())
 
     def as_flags(self) -> list[str]:
         """Return the flags that name these files."""

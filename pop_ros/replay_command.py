@@ -153,7 +153,9 @@ def _settings(flags: Sequence[str], *, draws: bool) -> ReplaySettings:
     from pop_ros.replay_settings import ReplaySettings
 
     settings = ReplaySettings.of_flags(flags)
-    if draws and settings.node.mesh.detail != 'full':
+    mesh = settings.node.mesh
+    if draws and (mesh.detail != 'full' or mesh.max_rate_hz):
         raise typer.BadParameter(
-            '--pictures and --rerun draw full meshes: leave --set mesh.detail away')
+            '--pictures and --rerun draw the full mesh of every frame: leave --set mesh.detail '
+            'and mesh.max_rate_hz away')
     return settings

@@ -82,7 +82,8 @@ def runner_up_arrays(runners_up: Sequence[RunnerUp], n_betas: int) -> dict[str, 
         'transl': (3,), 'global_orient': (3,), 'body_pose': (23, 3), 'betas': (n_betas,),
         'scale': ()}
     arrays = {
-        f'runners_up_{name}': np.array([getattr(p, name) for p in every]).reshape(-1, *shape)
+        f'runners_up_{name}':
+            np.array([getattr(p, name) for p in every]).reshape(len(every), *shape)
         for name, shape in shapes.items()}
     return arrays | {
         'runners_up_excess_cost': np.array([other.excess_cost for other in runners_up]),

@@ -235,4 +235,4 @@ def _detection(
         joint_depth_m=np.where(inside, joints[:, 2], np.nan),
         joint_sigma_m=np.where(inside, np.sqrt(2.0) * person.sigma_m, np.nan),
         visible=person.visible, person_mask=mask,
-        part_labels=np.where(mask, labels.part, np.int8(-1)))
+        part_labels=np.where(mask, labels.part, np.int8(-1)), sees_colour=False)

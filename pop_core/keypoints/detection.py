@@ -32,6 +32,8 @@ class Detection:
         visible: Probability that each joint is seen, not hidden; None when the source cannot say.
         person_mask: Pixels of this person, or None.
         part_labels: Joint index (0..23) of the body part at each pixel, -1 elsewhere, or None.
+        sees_colour: Whether keypoints come from colour and are exact to some pixels; beside such
+            sources one that sees depth alone, and knows limbs to some centimetres, stands back.
 
     Raises:
         DetectionError: If an array has not one row for each of the 15 shared joints.
@@ -45,6 +47,7 @@ class Detection:
     visible: Float[np.ndarray, 's'] | None = None
     person_mask: Bool[np.ndarray, 'h w'] | None = None
     part_labels: Int8[np.ndarray, 'h w'] | None = None
+    sees_colour: bool = True
 
     def __post_init__(self) -> None:
         for name, shape in SHAPES.items():

@@ -20,14 +20,13 @@ from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.keypoints.keypoint_similarity import (
     common_size_px,
     joint_similarity,
-    mirrored,
     person_similarities,
 )
 from pop_core.keypoints.people import detection_of
 from pop_core.rgbd import RgbdFrame
 from pop_core.settings import setting
 
-COARSE_M = 0.02  # error of a keypoint in colour of somebody some metres away
+NAMED = 0.1  # keypoints of a lower score are hardly ever lifted
 SEEN = 0.5
 
 
@@ -85,18 +84,21 @@ def fuse(
 ) -> list[Detection]:
     """Return the people that several sources found, each once, best first.
 
-    The order of the sources does not matter. Somebody whom one source found twice is kept once.
+    The order of the sources does not matter. Somebody whom one source found twice is kept once,
+    and somebody without a keypoint not at all.
 
     Args:
         found: People by source.
         config: Settings; None takes the defaults.
     """
     config = config or FusionConfig()
-    named = [(person, source) for source, group in enumerate(found) for person in group]
+    named = [
+        (person, source) for source, group in enumerate(found) for person in group
+        if person.scores.any()]
     named.sort(key=lambda item: -item[0].score)
     people, sources = [person for person, _ in named], [source for _, source in named]
     same = person_similarities(people, people)
-    turned = [mirrored(person) for person in people]
+    turned = [person.with_sides_exchanged() for person in people]
     turned_same = person_similarities(people, turned) - config.mirror_gain
     groups: dict[int, dict[int, Detection]] = {}  # by the best member: a detection per source
     for i, person in enumerate(people):
@@ -152,25 +154,18 @@ def _confidences(
 ) -> tuple[Float[np.ndarray, 'm s'], Bool[np.ndarray, 's']]:
     """Return each source's confidence in each joint, 0 where it has no say, and who is named.
 
-    Named are joints that a source knows exactly. A coarse source has no say there; nor, beside
-    exact ones, about joints that it does not see itself: what poses people take tells as much.
+    Named are joints of which a source that sees colour is sure enough. One that sees depth alone
+    has no say there; nor, beside the other, about joints that it does not see itself: what poses
+    people take tells as much.
     """
     scores = np.stack([member.scores for member in members])
-    coarse = np.stack([_is_coarse(member) for member in members])
-    named = ((scores > 0) & ~coarse).any(axis=0)
+    in_colour = np.array([member.sees_colour for member in members])[:, None]
+    named = np.any(in_colour & (scores >= NAMED), axis=0)
     unseen = np.stack([
         np.zeros(len(member.scores), dtype=bool) if member.visible is None
         else member.visible < SEEN for member in members])
-    silent = coarse & (named | (unseen & named.any()))
+    silent = ~in_colour & (named | (unseen & named.any()))
     return np.where(silent, 0.0, scores), named
-
-
-def _is_coarse(member: Detection) -> Bool[np.ndarray, 's']:
-    """Return which joints a source knows less well than a keypoint in colour is worth."""
-    if member.joint_sigma_m is None:
-        return np.zeros(len(member.scores), dtype=bool)
-    with np.errstate(invalid='ignore'):
-        return np.asarray(member.joint_sigma_m > COARSE_M)
 
 
 def _depths(

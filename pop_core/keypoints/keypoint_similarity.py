@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from pop_core.body.joints import MIRROR, SHARED_MIRROR, SHARED_NAMES
+from pop_core.body.joints import SHARED_NAMES
 from pop_core.keypoints.boxes import box_areas, overlaps
 from pop_core.keypoints.detection import Detection
 
@@ -64,16 +64,3 @@ def common_size_px(people: Sequence[Detection]) -> float:
 
 def _size_px(areas: Float[np.ndarray, '*n']) -> Float[np.ndarray, '*n']:
     return np.maximum(np.sqrt(areas), 1.0)
-
-
-def mirrored(a: Detection) -> Detection:
-    """Return a person with left and right exchanged."""
-    def swap(values: Float[np.ndarray, 's'] | None) -> Float[np.ndarray, 's'] | None:
-        return None if values is None else values[SHARED_MIRROR]
-
-    labels = a.part_labels
-    if labels is not None:
-        labels = np.where(labels >= 0, MIRROR[labels], labels).astype(np.int8)
-    return Detection(
-        a.keypoints_px[SHARED_MIRROR], a.scores[SHARED_MIRROR], a.box_px, swap(a.joint_depth_m),
-        swap(a.joint_sigma_m), swap(a.visible), a.person_mask, labels)

@@ -15,7 +15,6 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool
 
 from pop_core.config import PipelineConfig
 from pop_core.depth_noise import DepthNoise, estimate_depth_noise
@@ -84,13 +83,17 @@ class Look:
         """Return the people who were seen."""
         return self.seen.found
 
-    def scene(self, taken: Bool[np.ndarray, 'h w'], track: int | None = None) -> Scene:
+    def scene(self, present: Scene, track: int | None = None) -> Scene:
         """Return its frame, with the pixels that nearer people explain.
 
         Args:
-            taken: Those pixels in the present frame: where people were, they are no more.
+            present: The present frame, with what nearer people hide there; of an earlier frame
+                only their pixels are known.
             track: Whose frame it is to be; None for somebody new, who is behind everybody.
         """
+        if self.frame.stamp_ns == present.frame.stamp_ns:
+            return replace(present, ground=self.seen.ground, noise=self.seen.noise)
+        taken = present.taken
         place = None if track is None else self.places.get(track)
         if place is not None:
             taken = np.zeros_like(taken) if place.cover is None else place.cover
@@ -128,18 +131,18 @@ class Glimpse:
         return offset_m(self.look.then(track, expected), self.look.found.lifted[self.index])
 
     def joints(
-        self, finder: Finder, taken: Bool[np.ndarray, 'h w'], track: int, expected: Expected
+        self, finder: Finder, present: Scene, track: int, expected: Expected
     ) -> LiftedJoints:
         """Return the person's joints where they should be by now.
 
         Args:
             finder: Lifts them anew where somebody nearer may have been in the way.
-            taken: Pixels that nearer people explain in the present frame.
+            present: The present frame, with what nearer people hide there.
             track: Number of the track that they belong to.
             expected: Where the person should be by now.
         """
         look = self.look
-        lifted = finder.lifted_behind(look.scene(taken, track), look.found, self.index)
+        lifted = finder.lifted_behind(look.scene(present, track), look.found, self.index)
         place = look.places.get(track)
         if place is None:
             return lifted

@@ -96,7 +96,8 @@ class BodyTracker:
         """Return the people of the next frame, nearest first, each with their track.
 
         A jump back in time or another camera ends all tracks: what follows is another recording.
-        A frame that is refused changes nothing: the next one goes on.
+        A frame that is refused for its stamp changes nothing; one whose keypoints could not be
+        read is over, and not to be tried again. The next one goes on after both.
 
         Args:
             frame: The frame.
@@ -173,7 +174,7 @@ class BodyTracker:
             f'tracker: expected a stamp at least {SHORTEST_GAP_NS} ns after that of the frame '
             f'before, {self._last[1]}, found {frame.stamp_ns}: the same frame again, or stamps '
             'that stand still or count no nanoseconds; frames without a clock can be fitted '
-            'alone (BodyPipeline, or tracking.enabled=false in the node)')
+            'alone (BodyPipeline; tracking.enabled=false of node and replay)')
 
     def _look(
         self, frame: RgbdFrame, seen: RgbdFrame, watch: Stopwatch, *, is_late: bool,
@@ -274,7 +275,7 @@ class BodyTracker:
         lifted, elsewhere = None, is_stale(track)
         fresh = self._fresh.take(track.id)
         if glimpse is not None:
-            lifted = glimpse.joints(self._finder, scene.taken, track.id, expected)
+            lifted = glimpse.joints(self._finder, scene, track.id, expected)
             astray = glimpse.offset_m(track.id, expected) > self.config.gate_m
             elsewhere = elsewhere or astray
             is_open = elsewhere or is_doubtful(track, self._gap) or (
@@ -306,7 +307,7 @@ class BodyTracker:
     def _ask(self, scene: Scene, glimpse: Glimpse, number: int | None = None) -> None:
         """Have a detected person fitted from retrieved poses; wait where nobody is known."""
         self._fresh.ask(
-            self.pipeline, glimpse.look.scene(scene.taken, number), glimpse.detection, number,
+            self.pipeline, glimpse.look.scene(scene, number), glimpse.detection, number,
             wait=self._gap.has_time or not self._tracks)
 
     def _begin(

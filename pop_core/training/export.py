@@ -55,13 +55,14 @@ def export_onnx(network: DepthNet, path: Path, about: str = '') -> None:
         model.metadata_props.add(key=key, value=value)
     onnx.save(model, str(path))
     apart = largest_difference(network, path)
-    if apart > SAME:
+    if not apart <= SAME:
+        path.unlink()
         raise ExportError(
             f'{path}: expected outputs within {SAME} of PyTorch, found them {apart:.2g} apart')
 
 
 def largest_difference(network: DepthNet, path: Path) -> float:
-    """Return how far the outputs of a network and of its file are apart at most.
+    """Return how far the outputs of a network and of its file are apart at most; NaN if one is.
 
     Args:
         network: The network, in evaluation mode.
@@ -75,6 +76,6 @@ def largest_difference(network: DepthNet, path: Path) -> float:
     with torch.no_grad():
         expected = network(torch.from_numpy(depth_m))
     found = load_onnx(path).run(depth_m)
-    return max(
-        float(np.abs(there - here.numpy()).max())
-        for here, there in zip(expected, found, strict=True))
+    return float(np.max([
+        np.abs(there - here.numpy()).max()
+        for here, there in zip(expected, found, strict=True)]))

@@ -7,6 +7,7 @@ import re
 import cv2
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from pop_core.body.default_body import default_body
 from pop_ros.report import Picture, Report
@@ -15,8 +16,10 @@ from pop_ros.warm_up import CAMERA
 pytest.importorskip('rclpy', reason='the demo plays a bag to a ROS node')
 
 from pop_ros import recorded_bodies, to_messages
-from pop_ros.demo import DemoError, DemoFrame, prepare_folder
-from pop_ros.demo_report import error_rows
+from pop_ros.cli import build_app
+from pop_ros.demo import DemoError, DemoFrame, DemoKeypoints, prepare_folder, source_of
+from pop_ros.demo_report import commands, error_rows
+from pop_ros.node_arguments import parse_arguments
 
 
 def test_a_mesh_is_read_back_from_its_triangles():
@@ -53,6 +56,25 @@ def test_an_earlier_demo_is_written_over(tmp_path):
     (paths.pictures / 'old.png').touch()
     again = prepare_folder(tmp_path / 'demo')
     assert not again.pictures.exists()
+
+
+@pytest.mark.parametrize(('keypoints', 'named'), [
+    (DemoKeypoints.DEPTH, 'depth'), (DemoKeypoints.TRUTH, 'json')])
+def test_the_node_is_told_where_keypoints_come_from(keypoints, named, tmp_path):
+    paths = prepare_folder(tmp_path / 'demo')
+    source = source_of(paths, keypoints)
+    assert parse_arguments(source.as_flags()).sources == source
+    assert source.keypoints == named
+    replay = next(line for line in commands(paths, keypoints) if line.startswith('pop replay'))
+    assert f'--keypoints {named}' in replay
+    assert ('--keypoints-dir keypoints' in replay) == (keypoints is DemoKeypoints.TRUTH)
+
+
+def test_other_keypoints_of_the_demo_are_refused(tmp_path):
+    done = CliRunner().invoke(
+        build_app('demo'), ['demo', '--keypoints', 'openpose', '--out', str(tmp_path / 'demo')])
+    assert done.exit_code == 2
+    assert not (tmp_path / 'demo').exists()
 
 
 def test_errors_are_split_by_what_the_camera_sees():

@@ -13,11 +13,12 @@ from pop_core.estimate import EstimateStatus, FrameResult, JointState
 from pop_core.fitting.body_fit import BodyFit, BodyFitter
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.region import RegionConfig
-from pop_core.pipeline import BodyPipeline, Scene
+from pop_core.pipeline import BodyPipeline, PersonFit, Scene
 from pop_core.retrieval.default_library import default_library
 from pop_core.rgbd import RgbdFrame
 from pop_core.synthesis.scene_config import SceneConfig
 from pop_core.synthesis.scenes import SyntheticScene, synthesise_scene
+from pop_core.tracking.tracker import BodyTracker
 
 
 class Given:
@@ -84,6 +85,31 @@ def test_a_nearer_person_hides_others_also_in_holes_of_depth(
     assert np.median(off_m) < 0.03
     there = ~np.isnan(depth_m) | ~nearer.mask
     np.testing.assert_array_equal(behind.frame.depth_m[there], depth_m[there])
+
+
+def test_who_is_found_behind_others_sees_no_holes_in_them(
+    scene: SyntheticScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a single frame, and in the first one of a recording."""
+    depth_m = scene.frame.depth_m.copy()
+    depth_m[np.random.default_rng(1).random(depth_m.shape) < 0.1] = np.nan
+    frame = RgbdFrame(scene.frame.rgb, depth_m, scene.frame.camera)
+    pipeline = BodyPipeline(
+        default_body(), default_library(),
+        Given([d for d in scene.detections() if d is not None]))
+    holes, fit_person = [], BodyPipeline.fit_person
+
+    def watched(self: BodyPipeline, seen: Scene, *arguments: Any) -> PersonFit:
+        if seen.taken.any():
+            holes.append(float(np.isnan(seen.frame.depth_m[seen.taken]).mean()))
+        return fit_person(self, seen, *arguments)
+
+    monkeypatch.setattr(BodyPipeline, 'fit_person', watched)
+    for look in (pipeline.process, BodyTracker(pipeline).process):
+        holes.clear()
+        assert len(look(frame).bodies) == 2
+        assert len(holes) == 1
+        assert holes[0] < 0.01
 
 
 def test_hidden_joints_are_called_hidden(scene: SyntheticScene, result: FrameResult) -> None:

@@ -9,7 +9,7 @@ from pop_core.body.joints import SHARED_INDEX
 from pop_core.keypoints.boxes import PersonBox
 from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.keypoints.fusion import FusedDetector, FusionConfig, fuse, merge
-from pop_core.keypoints.keypoint_similarity import mirrored, person_similarities
+from pop_core.keypoints.keypoint_similarity import person_similarities
 from pop_core.keypoints.people import detection_of
 
 WRIST = SHARED_INDEX['left_wrist']
@@ -74,6 +74,12 @@ def test_a_source_merged_with_itself_is_itself():
     assert len(fused) == 2
     for merged, single in zip(fused, people, strict=True):
         same(merged, single)
+
+
+def test_somebody_without_a_keypoint_is_nobody():
+    empty = replace(person(0, 0.9), scores=np.zeros(15))
+    assert fuse([[empty], [empty]]) == []
+    assert len(fuse([[empty], [person(0, 0.9)]])) == 1
 
 
 def test_nobody_and_nobody_is_nobody():
@@ -168,10 +174,10 @@ def test_neighbours_are_not_taken_for_each_other():
 
 
 def test_a_source_that_takes_left_for_right_follows_the_surer_one():
-    turned = mirrored(person(0, 0.6))
+    turned = person(0, 0.6).with_sides_exchanged()
     (fused,) = fuse([[person(0, 0.9)], [turned]])
     np.testing.assert_allclose(fused.keypoints_px, person(0).keypoints_px)
-    assert mirrored(turned).keypoints_px.tolist() == person(0).keypoints_px.tolist()
+    assert turned.with_sides_exchanged().keypoints_px.tolist() == person(0).keypoints_px.tolist()
 
 
 def test_similarity_is_symmetric_and_falls_with_distance():
@@ -199,16 +205,16 @@ def with_depth(detection, depth_m, sigma_m):
 
 
 def test_what_only_a_depth_source_knows_is_kept():
-    seen = with_depth(person(0, 0.5), 2.5, 0.01)
+    seen = with_depth(person(0, 0.5), 2.5, 0.03)
     (fused,) = fuse([[person(2, 0.9)], [seen]])
     np.testing.assert_allclose(fused.joint_depth_m, 2.5)
-    np.testing.assert_allclose(fused.joint_sigma_m, 0.01)
+    np.testing.assert_allclose(fused.joint_sigma_m, 0.03)
     np.testing.assert_allclose(fused.visible, 0.9)
     assert fused.person_mask is seen.person_mask
 
 
 def test_depth_of_a_place_that_is_not_believed_is_not_believed():
-    seen = with_depth(person(0, 0.5), 2.5, 0.01)
+    seen = with_depth(person(0, 0.5), 2.5, 0.03)
     seen.keypoints_px[WRIST] += [150, 0]
     (fused,) = fuse([[person(0, 0.9)], [seen]])
     assert np.isnan(fused.joint_depth_m[WRIST])
@@ -219,7 +225,7 @@ def test_a_coarse_source_has_a_say_where_no_other_names_a_joint():
     """A network of depth alone knows limbs to some centimetres: it would only add its errors."""
     exact = person(0, 0.8)
     exact.keypoints_px[WRIST], exact.scores[WRIST] = np.nan, 0.0
-    coarse = with_depth(person(3, 0.9), 2.5, 0.08)
+    coarse = replace(with_depth(person(3, 0.9), 2.5, 0.08), sees_colour=False)
     (fused,) = fuse([[exact], [coarse]])
     others = np.delete(np.arange(15), WRIST)
     np.testing.assert_allclose(fused.keypoints_px[others], exact.keypoints_px[others])
@@ -228,6 +234,11 @@ def test_a_coarse_source_has_a_say_where_no_other_names_a_joint():
     assert fused.joint_depth_m[WRIST] == 2.5
     assert fused.person_mask is coarse.person_mask
     assert fused.part_labels is None
+    exact.keypoints_px[WRIST], exact.scores[WRIST] = 0.0, 0.05  # nobody believes that one
+    (fused,) = fuse([[exact], [coarse]])
+    np.testing.assert_allclose(fused.keypoints_px[WRIST], coarse.keypoints_px[WRIST])
+    assert fused.scores[WRIST] == coarse.scores[WRIST]
+    exact.keypoints_px[WRIST], exact.scores[WRIST] = np.nan, 0.0
     unseen = replace(coarse, visible=np.full(15, 0.2))
     (fused,) = fuse([[exact], [unseen]])
     assert np.isnan(fused.keypoints_px[WRIST]).all()
@@ -239,7 +250,8 @@ def test_a_coarse_source_has_a_say_where_no_other_names_a_joint():
 def test_a_joint_that_is_guessed_in_colour_is_hidden_where_depth_says_so():
     colour = person(0, 0.9)
     colour.scores[WRIST] = 0.3
-    hidden = replace(with_depth(person(0, 0.5), 2.5, 0.08), visible=np.full(15, 0.1))
+    hidden = replace(
+        with_depth(person(0, 0.5), 2.5, 0.08), visible=np.full(15, 0.1), sees_colour=False)
     (fused,) = fuse([[colour], [hidden]])
     assert fused.visible[WRIST] == 0.3
     np.testing.assert_array_equal(np.delete(fused.visible, WRIST), 0.9)
@@ -306,7 +318,7 @@ def sees(truth, rng):
         scores[wild] *= 0.5
         scores[rng.random(15) < 0.15] = 0.0
         found = detection_of(uv, scores)
-        seen.append(mirrored(found) if rng.random() < 0.1 else found)
+        seen.append(found.with_sides_exchanged() if rng.random() < 0.1 else found)
     return seen
 
 

@@ -16,7 +16,11 @@ from pop_core.keypoints.depth_network import (  # noqa: E402 - torch first
     DepthNetwork,
     close_path,
 )
-from pop_core.training.export import export_onnx, largest_difference  # noqa: E402
+from pop_core.training.export import (  # noqa: E402
+    ExportError,
+    export_onnx,
+    largest_difference,
+)
 from pop_core.training.losses import losses  # noqa: E402
 from pop_core.training.muon import orthogonal  # noqa: E402
 from pop_core.training.network import (  # noqa: E402
@@ -177,6 +181,11 @@ def test_a_file_that_says_something_else_is_found_out(tmp_path):
     export_onnx(network, tmp_path / 'net.onnx')
     assert largest_difference(network, tmp_path / 'net.onnx') < 1e-3
     assert largest_difference(other, tmp_path / 'net.onnx') > 1e-2
+    with torch.no_grad():
+        next(network.parameters())[:] = np.nan
+    with pytest.raises(ExportError, match='found them nan apart'):
+        export_onnx(network, tmp_path / 'nan.onnx')
+    assert not (tmp_path / 'nan.onnx').exists()
 
 
 @pytest.mark.parametrize('size', [(64, 96), (160, 192)], ids=str)
