@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from pop_core.body.model import BodyModel
 from pop_core.config import PipelineConfig
+from pop_core.errors import RepeatedStampError
 from pop_core.estimate import FrameResult
 from pop_core.keypoints.detection import Detection, KeypointDetector
 from pop_core.pipeline import BodyPipeline
@@ -21,6 +24,8 @@ from pop_ros.model_files import PACKAGED, ModelFiles
 from pop_ros.node_config import NodeConfig
 from pop_ros.sources import make_pipeline
 from pop_ros.static_frames import StaticFrames, parse_extrinsics
+
+PAUSE_S = 1.0  # of cameras that go on none is as long
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,6 +80,7 @@ class FrameFitter:
             detector, pipeline_config, models.body, models.library, progress)
         self._tracker = BodyTracker(
             self._pipeline, config.tracking, finding, looking, searching)
+        self._followed_s = -math.inf
         self._messages = BodyMessages(self._pipeline.model, config)
         self._maker = FrameMaker(frames or StaticFrames())
         self._configure_inputs(config)
@@ -137,8 +143,24 @@ class FrameFitter:
         """
         frame = self._maker.make(color, depth, info, depth_info)
         if self._tracker.config.enabled:
-            result = self._tracker.process(frame, skipped)
+            result = self._follow(frame, skipped)
         else:
             result = self._pipeline.process(frame)
         outputs = self._messages.stream(result, frame, color.header.frame_id, wanted)
         return FittedFrame(frame, result, outputs)
+
+    def _follow(self, frame: RgbdFrame, skipped: int) -> FrameResult:
+        """Return the people of the next frame; after a pause an old one begins a recording anew.
+
+        Whoever ends a replay after its first frame, and starts it again, shows that frame again.
+        """
+        paused = time.monotonic() - self._followed_s > PAUSE_S
+        try:
+            return self._tracker.process(frame, skipped)
+        except RepeatedStampError:
+            if not paused:
+                raise
+            self._tracker.begin_anew()
+            return self._tracker.process(frame, skipped)
+        finally:
+            self._followed_s = time.monotonic()

@@ -89,7 +89,7 @@ class BodyTracker:
 
     def reset(self) -> None:
         """Forget everybody and count ids from 0 again."""
-        self._forget()
+        self.begin_anew()
         self._next_id = 0
 
     def process(self, frame: RgbdFrame, skipped: int = 0) -> FrameResult:
@@ -111,7 +111,7 @@ class BodyTracker:
         watch = Stopwatch()
         frame = self._of_known_camera(frame)
         if self._is_another_recording(frame):
-            self._forget()
+            self.begin_anew()
         self._check_stamp(frame)
         # What was left out before the first one was no lack of time.
         self._in_time = 0 if skipped and self._last is not None else self._in_time + 1
@@ -140,7 +140,8 @@ class BodyTracker:
         bodies.sort(key=lambda body: float(body.joints[0, 2]))
         return FrameResult(tuple(bodies), tuple(statuses), watch.times_ms)
 
-    def _forget(self) -> None:
+    def begin_anew(self) -> None:
+        """Take what follows for another recording: nobody is known, and numbers go on."""
         self._tracks.clear()
         self._fresh.forget()
         self._looks.forget()

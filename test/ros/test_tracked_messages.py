@@ -9,10 +9,12 @@ from support.recording import Recording, record
 from visualization_msgs.msg import Marker
 
 from pop_core.config import PipelineConfig
+from pop_core.errors import RepeatedStampError
 from pop_core.estimate import TrackState
 from pop_core.keypoints.openpose_json import OpenPoseJsonDetector
 from pop_core.rgbd import RgbdFrame
 from pop_core.tracking.tracking_config import TrackingConfig
+from pop_ros import frame_fitter
 from pop_ros.body_messages import MESH
 from pop_ros.frame_fitter import FittedFrame, FrameFitter
 from pop_ros.node_config import NodeConfig
@@ -61,6 +63,17 @@ def test_a_reset_gives_the_first_id_again(recording: Recording) -> None:
     fit(fitter, recording.scenes[0].frame)
     fitter.reset()
     assert meshes(fit(fitter, recording.scenes[1].frame)) == {0: Marker.ADD}
+
+
+def test_a_replay_that_is_started_again_after_its_first_frame_shows_it_again(
+    recording: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitter, frame = fitter_of(recording), recording.scenes[0].frame
+    assert meshes(fit(fitter, frame)) == {0: Marker.ADD}
+    with pytest.raises(RepeatedStampError):
+        fit(fitter, frame)
+    monkeypatch.setattr(frame_fitter, 'PAUSE_S', 0.0)
+    assert meshes(fit(fitter, frame)) == {0: Marker.DELETE, 1: Marker.ADD}
 
 
 def test_without_tracking_each_frame_stands_alone(recording: Recording) -> None:
