@@ -32,7 +32,7 @@ from pop_ros.frame_maker import FrameMaker
 from pop_ros.inputs import RgbdInputs, RgbdMessages
 from pop_ros.static_frames import StaticFrames
 
-RATE_HZ = 5.0
+RATE_HZ = 3.0
 
 
 def receive(names: list[str]) -> dict[int, RgbdMessages]:
