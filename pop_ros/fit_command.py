@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pop_core.errors import PopError
+from pop_ros.file_options import BodyFile, LibraryFile
 
 if TYPE_CHECKING:
     from pop_core.pipeline import BodyPipeline
@@ -35,10 +36,8 @@ def fit(
     decoder: Annotated[str | None, typer.Option(
         '--decoder', metavar='NAME',
         help='How to read a network whose outputs do not tell.')] = None,
-    body: Annotated[Path | None, typer.Option(
-        '--body', metavar='FILE', help='Body model made by "pop body import".')] = None,
-    library: Annotated[Path | None, typer.Option(
-        '--library', metavar='FILE', help='Pose library made by "pop library build".')] = None,
+    body: BodyFile = None,
+    library: LibraryFile = None,
     settings: Annotated[list[str] | None, typer.Option(
         '--set', metavar='NAME=VALUE',
         help='Change a setting, as in docs/parameters.md; may be repeated.')] = None,

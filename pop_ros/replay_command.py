@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pop_ros.file_options import BodyFile, LibraryFile
+
 if TYPE_CHECKING:
     from pop_ros.replay_settings import ReplaySettings
 
@@ -45,10 +47,8 @@ def replay(
         '--keypoints-dir', help='Folder of <stamp_ns>.json files.')] = None,
     decoder: Annotated[str | None, typer.Option(
         '--decoder', help='Decoder of a network whose outputs do not tell.')] = None,
-    body: Annotated[Path | None, typer.Option(
-        '--body', metavar='FILE', help='Body model made by "pop body import".')] = None,
-    library: Annotated[Path | None, typer.Option(
-        '--library', metavar='FILE', help='Pose library made by "pop library build".')] = None,
+    body: BodyFile = None,
+    library: LibraryFile = None,
     settings: Annotated[list[str] | None, typer.Option(
         '--set', metavar='NAME=VALUE',
         help='Change a setting of the pipeline or of the node, as in docs/parameters.md and '
