@@ -23,7 +23,6 @@ from pop_core.estimate import (
     FrameResult,
     JointState,
     RunnerUp,
-    TrackState,
 )
 from pop_core.geometry.camera import Camera
 from pop_core.rendering.pictures import result_picture
@@ -145,5 +144,5 @@ def _track_arrays(body: BodyEstimate) -> dict[str, Any]:
     if body.track is None:
         return {}
     return {
-        'track_id': np.int64(body.track.id), 'track_state': np.int64(TrackState(body.track.state)),
+        'track_id': np.int64(body.track.id), 'track_state': np.int64(body.track.state),
         'joint_unseen_s': body.track.joint_unseen_s}

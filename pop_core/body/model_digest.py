@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from functools import lru_cache
 
 import numpy as np
 
@@ -13,6 +14,7 @@ FLOATS = ('v_template', 'shapedirs', 'posedirs', 'J_regressor', 'weights')
 INTEGERS = ('parents', 'f')
 
 
+@lru_cache(maxsize=4)  # by identity: results of every frame state it
 def model_digest(model: BodyModel) -> str:
     """Return hexadecimal digits that are equal for models that give equal meshes.
 
