@@ -1,6 +1,6 @@
 """A fault of the node itself is counted, told and survived."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -47,6 +47,21 @@ def messages(recording: Recording, number: int) -> RgbdMessages:
     return RgbdMessages(
         image(frame.rgb, 'rgb8', stamp), depth_image(frame.depth_m, '16UC1', stamp),
         camera_info(frame.camera, stamp), 0.0, number=number)
+
+
+def after_pairs(
+    node: LifecycleNode, recording: Recording, numbers: Sequence[int]
+) -> NodeStatistics:
+    """Return what a node has counted that got these frames, each once the last was done with."""
+    work, statistics = prepared(node, recording.keypoints)
+    with Listener() as clock:
+        assert clock.spin_until(lambda: work.is_ready, READY_S)
+        work.run(True)
+        for number in numbers:
+            work.put(messages(recording, number))
+            assert clock.spin_until(lambda: statistics.snapshot().pending == 0, 20)
+    assert work.stop(10)
+    return statistics
 
 
 @pytest.fixture
@@ -99,14 +114,7 @@ def test_frames_that_nobody_had_time_for_do_not_make_a_camera_slow(
         FrameFitter, 'fit',
         lambda *args, skipped, **named: told.append(skipped) or fit(
             *args, skipped=skipped, **named))
-    work, statistics = prepared(node, recording.keypoints)
-    with Listener() as clock:
-        assert clock.spin_until(lambda: work.is_ready, READY_S)
-        work.run(True)
-        for number in (1, 2, 3, 6):
-            work.put(messages(recording, number))
-            assert clock.spin_until(lambda: statistics.snapshot().pending == 0, 20)
-    assert work.stop(10)
+    statistics = after_pairs(node, recording, (1, 2, 3, 6))
     assert statistics.snapshot().frames == 4
     # The sixth lies 0.2 s behind the third, as from a camera of 5 Hz, all of whose frames count.
     assert told == [0, 0, 0, 2]
@@ -150,14 +158,6 @@ def test_a_pair_that_comes_twice_is_dropped_and_explained(
     node: LifecycleNode, tmp_path: Path
 ) -> None:
     recording = record(tmp_path, n_frames=3, rate_hz=15.0)
-    work, statistics = prepared(node, recording.keypoints)
-    with Listener() as clock:
-        assert clock.spin_until(lambda: work.is_ready, READY_S)
-        work.run(True)
-        for number in (1, 2, 2, 3):
-            work.put(messages(recording, number))
-            assert clock.spin_until(lambda: statistics.snapshot().pending == 0, 20)
-    assert work.stop(10)
-    snapshot = statistics.snapshot()
+    snapshot = after_pairs(node, recording, (1, 2, 2, 3)).snapshot()
     assert (snapshot.frames, snapshot.faults, snapshot.drops) == (3, 0, {'repeated stamp': 1})
     assert 'the same frame again' in snapshot.latest_drop
