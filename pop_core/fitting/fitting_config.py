@@ -12,10 +12,10 @@ class FittingConfig:
     """How hypotheses are fitted and chosen."""
 
     surface_hypotheses: int = setting(
-        4, minimum=1, maximum=12,
+        6, minimum=1, maximum=12,
         about='Hypotheses that reach the surface fit, best of E_J3D first.')
     final_hypotheses: int = setting(
-        2, minimum=1, maximum=12,
+        3, minimum=1, maximum=12,
         about='Hypotheses that are fitted to the end, best of E_depth first.')
     limb_searches: int = setting(
         2, minimum=0, maximum=10,
@@ -27,7 +27,7 @@ class FittingConfig:
         3, minimum=0, maximum=20,
         about='Steps of the winner on the full mesh.')
     prior_weight: float = setting(
-        0.15, minimum=0.0, maximum=100.0,
+        0.5, minimum=0.0, maximum=100.0,
         about='Weight of the learned pose prior.')
     neighbour_weight: float = setting(
         0.15, minimum=0.0, maximum=100.0,

@@ -67,13 +67,17 @@ class HypothesisSteps:
         self.model, self.config, self.segmentation = model, config, segmentation
 
     def fit_joints(self, hypothesis: Hypothesis, observation: Observation) -> None:
-        """Fit placement and scale, then the pose under strong and weaker constraints (Eq. 2)."""
-        strong, weak = self.weights(strength=4.0), self.weights()
+        """Fit placement and scale, then the pose under strong constraints (Eq. 2).
+
+        What a retrieved pose is wrong about, the surface tells better than a few keypoints, some
+        of them wrong: followed to the end, those ruin poses that were right.
+        """
+        strong = self.weights(strength=4.0)
         placement = self._active(pose=False, betas=False)
         pose = self._active(pose=True, betas=False)
-        for active, weights, steps in ((placement, strong, 1), (pose, strong, 2), (pose, weak, 3)):
+        for active, steps in ((placement, 1), (pose, 2)):
             for _ in range(steps):
-                self._step(hypothesis, observation, weights, active, [])
+                self._step(hypothesis, observation, strong, active, [])
 
     def fit_surface(
         self,

@@ -229,10 +229,10 @@ def test_no_scenes_at_all_are_refused():
 
 def test_fewer_hypotheses_are_fitted_on_in_the_same_shares():
     assert accuracy.of_k(RetrievalConfig().candidates) == {
-        'retrieval.candidates': 6, 'fitting.surface_hypotheses': 4, 'fitting.final_hypotheses': 2}
+        'retrieval.candidates': 6, 'fitting.surface_hypotheses': 6, 'fitting.final_hypotheses': 3}
     assert accuracy.of_k(1) == {
         'retrieval.candidates': 1, 'fitting.surface_hypotheses': 1, 'fitting.final_hypotheses': 1}
-    assert accuracy.of_k(12)['fitting.final_hypotheses'] == 4
+    assert accuracy.of_k(12)['fitting.final_hypotheses'] == 6
 
 
 def test_every_ablation_names_settings_that_exist():
