@@ -44,7 +44,7 @@ TANGENTIAL_SHARE = 0.3  # of point to point beside point to plane, at the widest
 # The surface knows better than keypoints once the kernel is narrower than this.
 TRUSTED_M = 0.10
 # Weight of E_depth [per metre of mean pixel error] beside the other terms' costs.
-DEPTH_SCORE = 1000.0
+DEPTH_SCORE = 2000.0
 
 
 @dataclass(slots=True, eq=False)
