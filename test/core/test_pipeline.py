@@ -183,9 +183,10 @@ def test_keypoints_on_an_empty_wall_are_nobody(scene: SyntheticScene) -> None:
 def test_people_outside_the_region_of_interest_are_left_alone(
     scene: SyntheticScene, result: FrameResult
 ) -> None:
-    near, far = (body.joints[0, 2] for body in result.bodies)
-    config = PipelineConfig(region=RegionConfig(z_max_m=float(near + far) / 2))
     detections = [d for d in scene.detections() if d is not None]
+    anywhere = BodyPipeline(default_body(), default_library(), Given(detections))
+    near, far = sorted(anywhere.lift(scene.frame, d).distance_m for d in detections)
+    config = PipelineConfig(region=RegionConfig(z_max_m=(near + far) / 2))
     pipeline = BodyPipeline(default_body(), default_library(), Given(detections), config)
     found = pipeline.process(scene.frame)
     assert len(found.bodies) == 1
