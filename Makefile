@@ -20,6 +20,7 @@ DEMO ?= demo_output
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 TEST_MESSAGES := tf2_msgs hri_msgs zed_msgs vision_msgs yolo_msgs
+COMPUTED := test/core test/benchmarks test/docs
 SOURCES := $(shell find pop_core pop_ros -type f -not -name '*.pyc') setup.py package.xml
 
 .PHONY: demo test check bench-gate messages train viz docs pictures clean
@@ -28,8 +29,13 @@ SOURCES := $(shell find pop_core pop_ros -type f -not -name '*.pyc') setup.py pa
 demo: $(VENV)/.installed
 	cd / && $(abspath $(BIN))/pop demo --out $(abspath $(DEMO))
 
+# Tests of computation share two processes; those of nodes, bags and pictures want the machine for
+# themselves.
 test: $(VENV)/.tools
-	$(BIN)/python -m pytest
+	failed=0; \
+	$(BIN)/python -m pytest -n 2 --dist loadfile $(COMPUTED) || failed=1; \
+	$(BIN)/python -m pytest $(addprefix --ignore=,$(COMPUTED)) test || failed=1; \
+	exit $$failed
 
 check: $(VENV)/.tools
 	$(BIN)/python -m ruff check .
