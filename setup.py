@@ -53,7 +53,8 @@ setup(
         f'ros-jazzy-rmw-fastrtps-cpp; {ROS_WHEELS}',
     ],
     extras_require={
-        'test': ['beartype', 'mcap-ros2-support', 'mypy', 'onnx', 'pytest', 'pytest-xdist', 'ruff'],
+        'test': ['beartype', 'mcap-ros2-support', 'mypy', 'onnx', 'pytest', 'pytest-xdist',
+                 'ruff'],
         'train': ['onnx', 'torch==2.13.0'],
         'viz': ['rerun-sdk>=0.23'],
         'ray': ['ray'],
