@@ -75,9 +75,8 @@ class HypothesisSteps:
         strong = self.weights(strength=4.0)
         placement = self._active(pose=False, betas=False)
         pose = self._active(pose=True, betas=False)
-        for active, steps in ((placement, 1), (pose, 2)):
-            for _ in range(steps):
-                self._step(hypothesis, observation, strong, active, [])
+        for active in (placement, pose, pose):
+            self._step(hypothesis, observation, strong, active, [])
 
     def fit_surface(
         self,
