@@ -14,6 +14,7 @@ from pop_ros.file_options import BodyFile, LibraryFile
 if TYPE_CHECKING:
     from pop_ros.replay_settings import ReplaySettings
 
+DEFAULT_SOURCES = ['depth']
 ENDED_BY_CTRL_C = 130  # as a shell counts it
 
 
@@ -42,7 +43,7 @@ def replay(
         '--keypoints', metavar='SOURCE',
         help='depth (the embedded network, coarse), json (OpenPose files), the path of an ONNX '
              'network, or a name of "pop models list"; several are merged.',
-    )] = ['depth'],  # noqa: B006 - typer reads it, nobody writes it
+    )] = DEFAULT_SOURCES,
     keypoints_dir: Annotated[Path | None, typer.Option(
         '--keypoints-dir', help='Folder of <stamp_ns>.json files.')] = None,
     decoder: Annotated[str | None, typer.Option(
@@ -115,11 +116,12 @@ def replay(
     if every_frame and (loop or step or clock or node_running):
         raise typer.BadParameter(
             '--loop, --step, --clock and --node-running play to a node: leave --every-frame away')
-    if node_running and (body or library or settings):
+    asks_keypoints = keypoints != DEFAULT_SOURCES or keypoints_dir or decoder
+    if node_running and (body or library or settings or asks_keypoints):
         raise typer.BadParameter(
-            '--body, --library and --set are for the node that is started: give them to the one '
-            'that runs (pop node --body FILE, ros2 param set /pop NAME VALUE), or leave '
-            '--node-running away')
+            '--keypoints, --body, --library and --set are for the node that is started: give them '
+            'to the one that runs (pop node --body FILE, ros2 param set /pop NAME VALUE), or '
+            'leave --node-running away')
     if overlays and pictures is None:
         raise typer.BadParameter('--overlays needs a folder: name it with --pictures')
     if rerun is not None:

@@ -90,6 +90,7 @@ def test_a_setting_of_the_pipeline_leaves_out_whom_it_should(
     (['--every-frame', '--set', 'trackin.enabled=false'], 'tracking.enabled'),
     (['--node-running', '--body', '/none.npz'], 'give them to the one that runs'),
     (['--node-running', '--set', 'max_people=1'], 'give them to the one that runs'),
+    (['--node-running', '--keypoints', 'json'], 'give them to the one that runs'),
     (['--pictures', 'look', '--set', 'mesh.detail=reduced'], 'draw the full mesh of every'),
     (['--pictures', 'look', '--set', 'mesh.max_rate_hz=5'], 'draw the full mesh of every'),
 ])
