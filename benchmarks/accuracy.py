@@ -70,6 +70,7 @@ ABLATIONS: dict[str, dict[str, Value]] = {
     'K=1': of_k(1), 'K=3': of_k(3), 'K=12': of_k(12),
     'no free space': {'fitting.free_space': False},
     'no cond. prior': {'fitting.neighbour_weight': 0.0},
+    'no completion': {'use_completion': False},
 }
 
 

@@ -35,6 +35,9 @@ class PipelineConfig:
         about='Largest distance of the best library pose to the lifted joints, root mean square.')
     use_ground: bool = setting(
         True, about='Whether the floor is looked for: feet stand on it and never below it.')
+    use_completion: bool = setting(
+        True, about='Whether a network says where hidden joints are expected, and which keypoints '
+        'are wrong.')
     region: RegionConfig = field(default_factory=RegionConfig)
     people: PeopleConfig = field(default_factory=PeopleConfig)
     fusion: FusionConfig = field(default_factory=FusionConfig)

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from threadpoolctl import ThreadpoolController
 
 from pop_core.body.model import BodyModel
+from pop_core.completion.joint_completion import JointCompletion, load_completion
 from pop_core.config import PipelineConfig
 from pop_core.depth_noise import DepthNoise, estimate_depth_noise
 from pop_core.estimate import BodyEstimate, EstimateStatus, FrameResult
@@ -28,7 +29,7 @@ from pop_core.keypoints.region import is_inside
 from pop_core.keypoints.undistortion import undistort_detection
 from pop_core.rendering.depth_renderer import render_depth
 from pop_core.retrieval.candidate import PoseCandidate
-from pop_core.retrieval.outliers import reject_outliers
+from pop_core.retrieval.outliers import reject_outliers, reject_strangers
 from pop_core.retrieval.pose_library import PoseLibrary
 from pop_core.retrieval.pose_prior import PosePrior, load_pose_prior
 from pop_core.retrieval.retrieve import retrieve
@@ -89,12 +90,25 @@ class BodyPipeline:
         detector: KeypointDetector,
         config: PipelineConfig | None = None,
         prior: PosePrior | None = None,
+        completion: JointCompletion | None = None,
     ) -> None:
-        """Prepare the pipeline for one body model, pose library and keypoint source."""
+        """Prepare the pipeline for one body model, pose library and keypoint source.
+
+        Args:
+            model: Body to fit.
+            library: Poses to begin with.
+            detector: Finds people.
+            config: Settings; None takes the defaults.
+            prior: Pose prior; None takes the embedded one.
+            completion: Says where hidden joints are, unless `use_completion` is off; None takes
+                the embedded one.
+        """
         self.model, self.library, self.detector = model, library, detector
         self.config = config or PipelineConfig()
         self.fitter = BodyFitter(
             model, prior or load_pose_prior(), self.config.fitting, self.config.segmentation)
+        self.completion = (
+            completion or load_completion() if self.config.use_completion else None)
         # Small products are slower on several BLAS threads than on one.
         self._blas = ThreadpoolController()
 
@@ -209,10 +223,16 @@ class BodyPipeline:
             status = self.admit(lifted)
             if status is not EstimateStatus.OK:
                 return PersonFit(status)
+        expected = None
+        if self.completion is not None:
+            with watch.step('complete'):
+                expected = self.completion.expected(
+                    scene.frame.depth_m, scene.frame.camera, detection)
+                lifted = reject_strangers(lifted, expected)
         with watch.step('observe'):
             observation = observe(
                 scene.frame, lifted, scene.taken, scene.ground, detection.part_labels,
-                scene.noise)
+                scene.noise, expected=expected)
         with watch.step('retrieve'):
             candidates = self._retrieve(lifted, observation, scene.frame.camera)
         if not candidates or candidates[0].residual_m > self.config.max_residual_m:
@@ -245,7 +265,7 @@ class BodyPipeline:
         gravity = None if observation.ground is None else -observation.ground.normal
         return retrieve(
             self.library, lifted, self.config.retrieval, hides=in_the_open_m, gravity=gravity,
-            camera=camera)
+            camera=camera, expected=observation.expected)
 
     def estimate(
         self, scene: Scene, fit: BodyFit, trust: float,

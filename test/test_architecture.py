@@ -16,6 +16,7 @@ LAYERS = (
     ('pop_core.config',),
     ('pop_core.fitting',),
     ('pop_core.segmentation', 'pop_core.retrieval'),
+    ('pop_core.completion',),
     ('pop_core.rendering', 'pop_core.keypoints'),
     ('pop_core.estimate',),
     ('pop_core.body',),

@@ -19,6 +19,8 @@ from pop_core.fitting.priors import (
 )
 from pop_core.fitting.residuals import (
     Pairs,
+    expected_residual,
+    expected_weight,
     joint_residual,
     joint_weight,
     pair_residual,
@@ -31,8 +33,8 @@ from pop_core.retrieval.pose_prior import PosePrior
 
 # Which of `BodyEnergy.terms` say what; those after the priors are pairs of E_NN.
 JOINT_BLOCKS = slice(0, 2)
-PRIOR_BLOCKS = slice(2, 7)
-PAIR_BLOCKS = slice(7, None)
+PRIOR_BLOCKS = slice(2, 8)
+PAIR_BLOCKS = slice(8, None)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PriorBelief:
@@ -58,6 +60,7 @@ class TermWeights:
         prior: Of the pose prior.
         neighbours: Of the conditional prior.
         collision: Of limbs inside the trunk or each other.
+        expected: Of the joints that are expected from depth and keypoints.
         robust_m: Scale of the robust kernel of E_J3D [m].
     """
 
@@ -65,6 +68,7 @@ class TermWeights:
     prior: float = 1.0
     neighbours: float = 1.0
     collision: float = 0.0
+    expected: float = 0.0
     robust_m: float = 0.15
 
 
@@ -88,6 +92,8 @@ class BodyEnergy:
         self.joint_weight = weights.joints * joint_weight(
             state, lifted, weights.robust_m, power)
         self.ray_weight = weights.joints * ray_weight(state, rays, power)
+        self.expected_weight = weights.expected * expected_weight(
+            state, observation.expected, power)
         self.scale_weight = scale_weight(state, power)
 
     def terms(self, state: BodyState, jacobian: bool) -> list[Term]:
@@ -97,6 +103,8 @@ class BodyEnergy:
         blocks: list[Term] = [
             joint_residual(state, lifted, self.joint_weight, jacobian=jacobian),
             ray_residual(state, rays, self.ray_weight, jacobian=jacobian),
+            expected_residual(
+                state, self.observation.expected, self.expected_weight, jacobian=jacobian),
             pose_prior_term(state, belief.prior, weights.prior, jacobian=jacobian),
             conditional_prior_term(
                 state, belief.pose, belief.sigma_rad, weights.neighbours, jacobian=jacobian),

@@ -35,6 +35,9 @@ class FittingConfig:
     collision_weight: float = setting(
         1.0, minimum=0.0, maximum=100.0,
         about='Weight of limbs that may not pass through the trunk or each other.')
+    expected_weight: float = setting(
+        0.5, minimum=0.0, maximum=100.0,
+        about='Weight of where the completion network expects the joints.')
     other_readings: bool = setting(
         True,
         about='Whether bodies are tried turned about, legs exchanged, limbs rolled back, too.')

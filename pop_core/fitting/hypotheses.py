@@ -181,7 +181,7 @@ class HypothesisSteps:
         config = self.config
         return TermWeights(
             joints, strength * config.prior_weight, strength * config.neighbour_weight,
-            config.collision_weight)
+            config.collision_weight, config.expected_weight)
 
     def _step(
         self,

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
 from pop_core.body.joints import SHARED_MIRROR
+from pop_core.completion.joint_belief import JointBelief
 from pop_core.depth_noise import USUAL_NOISE, DepthNoise
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.body_parts import LABEL_MIRROR
@@ -82,6 +83,7 @@ class Observation:
         noise: Noise of the measured depth.
         standing_clear: Surface of limbs that was found beside the first bodies fitted; None
             before it was looked for.
+        expected: What is believed of all joints, seen or hidden; None if nothing is.
     """
 
     window: Window
@@ -95,6 +97,7 @@ class Observation:
     ground: Ground | None
     noise: DepthNoise = USUAL_NOISE
     standing_clear: Bool[np.ndarray, 'h w'] | None = None
+    expected: JointBelief | None = None
 
     def points(self, mask: Bool[np.ndarray, 'h w']) -> Float[np.ndarray, 'n 3']:
         """Return the measured points of a mask [m], camera frame, in row order."""
@@ -120,7 +123,8 @@ class Observation:
         return replace(
             self, lifted=self.lifted.with_sides_exchanged(),
             keypoint_rays=replace(rays, joint=SHARED_MIRROR[rays.joint]),
-            labels=None if labels is None else LABEL_MIRROR[labels])
+            labels=None if labels is None else LABEL_MIRROR[labels],
+            expected=None if self.expected is None else self.expected.with_sides_exchanged())
 
     def depth_at(
         self, p_camera: Float[np.ndarray, 'n 3']
@@ -146,6 +150,8 @@ def observe(
     ground: Ground | None = None,
     labels: Int[np.ndarray, 'h w'] | None = None,
     noise: DepthNoise = USUAL_NOISE,
+    *,
+    expected: JointBelief | None = None,
 ) -> Observation:
     """Return the observation of one person.
 
@@ -156,6 +162,7 @@ def observe(
         ground: The floor of the scene, if one is seen.
         labels: Body part per pixel as a joint index, -1 where unknown.
         noise: Noise of the measured depth.
+        expected: What is believed of all joints.
     """
     window = person_window(lifted, frame.camera)
     lifted = lifted.without_guesses()
@@ -169,7 +176,8 @@ def observe(
         own &= ~ground.floor_pixels(depth_m, camera)
     of_keypoints = keypoint_rays(lifted, frame.camera)
     return Observation(
-        window, camera, depth_m, rays, own, parts, lifted, of_keypoints, ground, noise)
+        window, camera, depth_m, rays, own, parts, lifted, of_keypoints, ground, noise,
+        expected=expected)
 
 
 def keypoint_rays(lifted: LiftedJoints, camera: Camera) -> KeypointRays:

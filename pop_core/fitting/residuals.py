@@ -11,14 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from pop_core.completion.joint_belief import JointBelief
 from pop_core.fitting import keypoint_kernels
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.levenberg_marquardt import Residual, no_residual
 from pop_core.fitting.observation import KeypointRays
 from pop_core.fitting.pair_kernels import merge, offsets
-from pop_core.fitting.robust_loss import Power
+from pop_core.fitting.robust_loss import Power, geman_mcclure_share
 from pop_core.keypoints.lifted_joints import LiftedJoints
 
+EXPECTED_SIGMAS = 3.0  # a joint farther from where it is expected keeps a quarter of the pull
 RAY_SCALE_M = 0.4  # a guessed pixel may be on another limb
 
 
@@ -35,6 +37,30 @@ def joint_residual(
 ) -> Residual:
     """Return E_J3D: offsets of the shared points from the lifted joints (Eq. 2)."""
     rows, r, w = keypoint_kernels.joint_offsets(state.landmarks, lifted.positions_camera, weight)
+    J = state.landmark_jacobian[rows].reshape(-1, state.body.size) if jacobian else None
+    return Residual(r, J, w)
+
+
+def expected_weight(
+    state: BodyState, expected: JointBelief | None, power: Power
+) -> Float[np.ndarray, 's']:
+    """Return the robust weight 1/sigma^2 of every shared joint that is expected somewhere."""
+    if expected is None:
+        return np.zeros(len(state.landmarks))
+    off_m = np.linalg.norm(state.landmarks - expected.positions_camera, axis=1)
+    share = geman_mcclure_share(off_m / expected.sigma_m, EXPECTED_SIGMAS) ** power
+    return np.asarray(share / expected.sigma_m**2)
+
+
+def expected_residual(
+    state: BodyState, expected: JointBelief | None, weight: Float[np.ndarray, 's'],
+    *, jacobian: bool,
+) -> Residual:
+    """Return offsets of the shared points from where they are expected."""
+    if expected is None:
+        return no_residual(state.body.size)
+    rows, r, w = keypoint_kernels.joint_offsets(
+        state.landmarks, expected.positions_camera, weight)
     J = state.landmark_jacobian[rows].reshape(-1, state.body.size) if jacobian else None
     return Residual(r, J, w)
 

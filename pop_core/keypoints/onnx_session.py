@@ -62,21 +62,21 @@ class OnnxSession:
                     f'{where}: expected tensors of up to {LARGEST_TENSOR} elements, '
                     f'found {tensor}')
 
-    def run(self, tensor: Tensor) -> Sequence[Tensor]:
-        """Return the outputs of one input, in the network's order, half floats as floats.
+    def run(self, *tensors: Tensor) -> Sequence[Tensor]:
+        """Return the outputs of its inputs, in the network's order, half floats as floats.
 
         Raises:
             NetworkShapeError: If the network fails, or gives other shapes than it declares.
         """
-        entry = self.spec.inputs[0]
-        if entry.dtype in FLOATS:
-            tensor = tensor.astype(entry.dtype, copy=False)
+        inputs = {
+            entry.name: tensor.astype(entry.dtype, copy=False) if entry.dtype in FLOATS else tensor
+            for entry, tensor in zip(self.spec.inputs, tensors, strict=False)}
         options = onnxruntime.RunOptions()
         alarm = Timer(self.longest_s, setattr, (options, 'terminate', True))
         alarm.daemon = True
         alarm.start()
         try:
-            outputs = self._session.run(None, {entry.name: tensor}, options)
+            outputs = self._session.run(None, inputs, options)
         except Exception as error:  # noqa: BLE001 - ONNX Runtime's errors share no public base
             raise NetworkShapeError(
                 f'{self.where}: expected outputs within {self.longest_s:.0f} s, found: '

@@ -14,12 +14,14 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 
+from pop_core.completion.joint_belief import JointBelief
 from pop_core.keypoints.lifted_joints import LiftedJoints, LiftState
 from pop_core.retrieval.pose_library import PoseLibrary
 from pop_core.retrieval.procrustes import rank_similarities
 from pop_core.retrieval.retrieve import RetrievalConfig
 
 THIN = 8  # every so many poses are enough to tell a wrong joint
+AT_ODDS = 2.5  # joint standard deviations that lifted joints may lie off what is expected
 GAIN = 16.0  # chi-squared that a joint must cost: 4 sigma
 FEWEST = 5  # joints that always stay: fewer agree with anything
 MOST_DROPPED = 4
@@ -50,6 +52,24 @@ def reject_outliers(
         if together - alone[worst] < GAIN:
             break
         lifted = _dropped(lifted, int(seen[worst]))
+    return lifted
+
+
+def reject_strangers(lifted: LiftedJoints, expected: JointBelief | None) -> LiftedJoints:
+    """Return lifted joints without those that are far from where they are expected.
+
+    What is expected was told by who saw the keypoint and what surrounds it.
+
+    Args:
+        lifted: Lifted joints of one person.
+        expected: Where they are expected, or None.
+    """
+    if expected is None:
+        return lifted
+    apart_m = np.linalg.norm(lifted.positions_camera - expected.positions_camera, axis=1)
+    far = lifted.lifted & (apart_m > AT_ODDS * np.hypot(lifted.sigma_m, expected.sigma_m))
+    for joint in np.flatnonzero(far):
+        lifted = _dropped(lifted, int(joint))
     return lifted
 
 

@@ -8,12 +8,13 @@ pixel, and whether the scene can hide them where the pose puts them.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypedDict
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
+from pop_core.completion.joint_belief import JointBelief
 from pop_core.geometry.camera import Camera
 from pop_core.geometry.rotation import from_rotvec
 from pop_core.keypoints.lifted_joints import LiftedJoints
@@ -85,6 +86,7 @@ def retrieve(
     hides: Hides | None = None,
     gravity: Float[np.ndarray, '3'] | None = None,
     camera: Camera | None = None,
+    expected: JointBelief | None = None,
 ) -> list[PoseCandidate]:
     """Return K diverse poses placed in the scene, best first (Eq. 1).
 
@@ -97,6 +99,7 @@ def retrieve(
         gravity: Direction of gravity in the camera frame; poses then stand as they do in the
             library, give or take `lean_sigma_deg`. None: any rotation.
         camera: Gives the rays of hidden joints that have a pixel. None: rays are not used.
+        expected: What is believed of all joints; None: only those lifted are known.
 
     Returns:
         At most `config.candidates` poses, none when fewer than three joints were lifted.
@@ -105,14 +108,16 @@ def retrieve(
     seen = lifted.lifted
     if int(seen.sum()) < MIN_JOINTS:
         return []
+    known = completed(lifted, expected)
+    used = known.lifted
     weight = np.zeros(len(seen))
-    weight[seen] = 1.0 / (lifted.sigma_m[seen] ** 2 + config.pose_sigma_m**2)
+    weight[used] = 1.0 / (known.sigma_m[used] ** 2 + config.pose_sigma_m**2)
     R_camera_up = _upright_frame(gravity)
     rules = _placement_rules(gravity is not None, weight, config)
-    shortlist = _shortlist(library, lifted, weight, config, R_camera_up, rules)
+    shortlist = _shortlist(library, known, weight, config, R_camera_up, rules)
     joints = np.asarray(library.joints[shortlist], dtype=np.float64)
     placed = solve_similarities(
-        joints[:, seen], lifted.positions_camera[seen] @ R_camera_up, weight[seen],
+        joints[:, used], known.positions_camera[used] @ R_camera_up, weight[used],
         (config.smallest_scale, config.largest_scale), **rules)
     joints_camera = placed.apply(joints) @ R_camera_up.T
     energy = (placed.residual_m**2 + placed.prior_cost) * weight.sum()
@@ -133,6 +138,20 @@ def retrieve(
         )
         for i, pose, share in zip(chosen, shortlist[chosen], belief, strict=True)
     ]
+
+
+def completed(lifted: LiftedJoints, expected: JointBelief | None) -> LiftedJoints:
+    """Return joints where lifting and what is expected together have them."""
+    if expected is None:
+        return lifted
+    seen = lifted.lifted
+    ours = np.where(seen, 1.0 / lifted.sigma_m**2, 0.0)
+    theirs = 1.0 / expected.sigma_m**2
+    measured = np.where(seen[:, None], lifted.positions_camera, 0.0)
+    both = ours[:, None] * measured + theirs[:, None] * expected.positions_camera
+    return replace(
+        lifted, positions_camera=both / (ours + theirs)[:, None],
+        sigma_m=1.0 / np.sqrt(ours + theirs))
 
 
 def hidden_energy(

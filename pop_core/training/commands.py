@@ -1,4 +1,4 @@
-"""`python -m pop_core.training COMMAND`: scenes, train, validate, export."""
+"""`python -m pop_core.training COMMAND`: scenes, train, validate, export, completion."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import torch
 import typer
 
 from pop_core.errors import PopError
+from pop_core.training.completion.commands import app as completion
 from pop_core.training.export import export_onnx
 from pop_core.training.network import NetworkConfig
 from pop_core.training.run import RunConfig, train
@@ -34,6 +35,7 @@ SIZES = {
 }
 IMAGES = {'small': (192, 160), 'large': (288, 224), 'close': (128, 160)}
 app = typer.Typer(add_completion=False, no_args_is_help=True, rich_markup_mode=None)
+app.add_typer(completion, name='completion')
 
 Size = Annotated[str, typer.Option('--size', help=f'One of {", ".join(SIZES)}.')]
 Mocap = Annotated[Path | None, typer.Option(

@@ -70,17 +70,17 @@ class DepthNet(nn.Module):
         super().__init__()
         self.config = config or NetworkConfig()
         first, *widths = self.config.widths
-        self.stem = _convolution(2 + len(RELIEF_M), first, stride=2)
+        self.stem = convolution(2 + len(RELIEF_M), first, stride=2)
         stages, before = [], first
         for width, count in zip(widths, self.config.blocks, strict=True):
             blocks = [ResidualBlock(width) for _ in range(count)]
-            stages.append(nn.Sequential(_convolution(before, width, stride=2), *blocks))
+            stages.append(nn.Sequential(convolution(before, width, stride=2), *blocks))
             before = width
         self.stages = nn.ModuleList(stages)
         pyramid = self.config.pyramid
         self.laterals = nn.ModuleList(nn.Conv2d(width, pyramid, 1) for width in widths)
         self.head = nn.Sequential(
-            _convolution(pyramid, pyramid), nn.Conv2d(pyramid, sum(OUTPUT_CHANNELS), 1))
+            convolution(pyramid, pyramid), nn.Conv2d(pyramid, sum(OUTPUT_CHANNELS), 1))
 
     def forward(self, depth_m: Float[Tensor, 'n 1 h w']) -> DepthMaps:
         """Return maps of depth images [m], 0 where nothing was measured; sides divisible by 32."""
@@ -110,7 +110,7 @@ class ResidualBlock(nn.Module):
     def __init__(self, width: int) -> None:
         """Build with random weights."""
         super().__init__()
-        self.first = _convolution(width, width)
+        self.first = convolution(width, width)
         self.second = nn.Sequential(
             nn.Conv2d(width, width, 3, padding=1, bias=False), nn.BatchNorm2d(width))
 
@@ -134,7 +134,8 @@ def relief_channels(depth_m: Float[Tensor, 'n 1 h w']) -> Float[Tensor, 'n 4 h w
     return torch.cat(channels, dim=1)
 
 
-def _convolution(before: int, width: int, stride: int = 1) -> nn.Sequential:
+def convolution(before: int, width: int, stride: int = 1) -> nn.Sequential:
+    """Return a 3x3 convolution, its normalisation (Ioffe and Szegedy 2015) and ReLU."""
     return nn.Sequential(
         nn.Conv2d(before, width, 3, stride, 1, bias=False), nn.BatchNorm2d(width),
         nn.ReLU(inplace=True))

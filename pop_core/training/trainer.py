@@ -91,7 +91,7 @@ class Trainer:
         targets = make_targets(batch)
         self.network.train()
         # bfloat16 needs no scaling of the loss.
-        with torch.autocast(self.device.type, torch.bfloat16, _has_bfloat16(self.device)):
+        with torch.autocast(self.device.type, torch.bfloat16, has_bfloat16(self.device)):
             maps = self.network(batch.depth_m[:, None].contiguous(
                 memory_format=torch.channels_last))
         terms = losses(maps, targets)
@@ -171,7 +171,7 @@ class Trainer:
             self.history = list(state['history'])
 
 
-def _has_bfloat16(device: torch.device) -> bool:
+def has_bfloat16(device: torch.device) -> bool:
     """Return whether a device has bfloat16 itself: imitated it is slower than float32."""
     if device.type == 'cuda':
         return torch.cuda.is_bf16_supported(including_emulation=False)

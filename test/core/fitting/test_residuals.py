@@ -6,6 +6,7 @@ from support.derivatives import assert_is_derivative, assert_is_gradient
 from support.one_person import CAMERA, lift_truth
 
 from pop_core.body.model import BodyModel, BodyParameters
+from pop_core.completion.joint_belief import JointBelief
 from pop_core.fitting.body_state import BodyState, FitBody
 from pop_core.fitting.levenberg_marquardt import assemble, cost_of
 from pop_core.fitting.observation import keypoint_rays
@@ -18,6 +19,8 @@ from pop_core.fitting.priors import (
 )
 from pop_core.fitting.residuals import (
     Pairs,
+    expected_residual,
+    expected_weight,
     joint_residual,
     merged_pairs,
     no_pairs,
@@ -46,6 +49,25 @@ def lifted(body: BodyModel, person: BodyParameters) -> LiftedJoints:
 def test_joint_term(state: BodyState, lifted: LiftedJoints) -> None:
     weight = np.ones(15)
     assert_is_derivative(lambda s, j: joint_residual(s, lifted, weight, jacobian=j), state)
+
+
+def test_expected_term(state: BodyState, lifted: LiftedJoints) -> None:
+    expected = JointBelief(lifted.positions_camera, np.full(15, 0.1))
+    weight = expected_weight(state, expected, Power.STEP)
+    assert (weight > 0).all()
+    assert_is_derivative(lambda s, j: expected_residual(s, expected, weight, jacobian=j), state)
+
+
+def test_what_is_expected_far_off_pulls_less(state: BodyState) -> None:
+    off = np.zeros((15, 3))
+    off[3, 0], off[4, 0] = 0.3, 3.0  # three and thirty sigmas
+    expected = JointBelief(state.landmarks + off, np.full(15, 0.1))
+    for power, share in ((Power.COMPARED, 0.5), (Power.STEP, 0.25)):
+        weight = expected_weight(state, expected, power)
+        assert np.allclose(np.delete(weight, [3, 4]), 100.0)
+        assert weight[3] == pytest.approx(100.0 * share)
+        assert weight[4] < 2.0
+    assert not expected_weight(state, None, Power.STEP).any()
 
 
 def test_ray_term(state: BodyState, lifted: LiftedJoints) -> None:
@@ -93,6 +115,7 @@ def test_a_term_without_weight_is_an_empty_block(
     for block in (
         joint_residual(state, lifted, np.zeros(15), jacobian=True),
         ray_residual(state, rays, np.zeros(15), jacobian=True),
+        expected_residual(state, None, np.zeros(15), jacobian=True),
         collision_residual(state, 0.0, jacobian=True),
     ):
         assert len(block.r) == 0

@@ -5,13 +5,15 @@ from pop_core.body.default_body import default_body
 from pop_core.body.joints import SHARED_INDEX
 from pop_core.body.kinematics import attached_positions
 from pop_core.body.model import BodyParameters, shared_points
+from pop_core.completion.joint_belief import JointBelief
 from pop_core.errors import LibraryFileError
 from pop_core.geometry.camera import Camera
 from pop_core.geometry.rotation import from_rotvec, to_rotvec
 from pop_core.keypoints.lifted_joints import LiftedJoints, LiftState
 from pop_core.retrieval.default_library import generate_library
+from pop_core.retrieval.outliers import reject_strangers
 from pop_core.retrieval.pose_library import PoseLibrary, build_library, visibility_mask
-from pop_core.retrieval.retrieve import RetrievalConfig, choose_diverse, retrieve
+from pop_core.retrieval.retrieve import RetrievalConfig, choose_diverse, completed, retrieve
 
 UPRIGHT = from_rotvec(np.array([np.pi, 0.0, 0.0]))
 ARM = [SHARED_INDEX['left_elbow'], SHARED_INDEX['left_wrist']]
@@ -53,6 +55,48 @@ def test_few_noisy_joints_leave_a_person_near_usual_size(library):
         retrieve(library, seen_from(joints, hidden))[0].scale for hidden in ([], few))
     assert 0.69 < many < 0.76
     assert many < told <= 1.0
+
+
+def test_hidden_joints_are_looked_for_where_they_are_expected(library):
+    joints, other = placed(library, 42), placed(library, 700)
+    joints[LEGS] = joints[0] + other[LEGS] - other[0]
+    lifted = seen_from(joints, LEGS)
+    alone = retrieve(library, lifted)[0]
+    expected = JointBelief(joints + 0.02, np.where(np.isin(np.arange(15), LEGS), 0.1, 0.05))
+    told = retrieve(library, lifted, expected=expected)[0]
+    off_m = [np.linalg.norm((found.joints_camera - joints)[LEGS], axis=1).mean()
+             for found in (alone, told)]
+    assert off_m[1] < 0.6 * off_m[0]
+
+
+def test_lifting_and_what_is_expected_count_by_their_spread(library):
+    joints = placed(library, 42)
+    lifted = seen_from(joints, LEGS)
+    expected = JointBelief(joints + [0.03, 0.0, 0.0], np.full(15, 0.04))
+    known = completed(lifted, expected)
+    assert known.lifted.all()
+    sure = [j for j in range(15) if j not in LEGS]
+    assert np.allclose((known.positions_camera - joints)[sure, 0], 0.03 / 5)
+    assert np.allclose(known.sigma_m[sure], (1 / 0.02**2 + 1 / 0.04**2) ** -0.5)
+    assert np.allclose(known.positions_camera[LEGS], expected.positions_camera[LEGS])
+    assert np.allclose(known.sigma_m[LEGS], 0.04)
+    assert completed(lifted, None) is lifted
+
+
+def test_a_joint_far_from_where_it_is_expected_is_a_stranger(library):
+    joints = placed(library, 42)
+    lifted = seen_from(joints, LEGS)
+    expected = JointBelief(joints.copy(), np.full(15, 0.04))
+    expected.positions_camera[ARM] += [[0.1, 0.0, 0.0], [0.5, 0.0, 0.0]]
+    told = reject_strangers(lifted, expected)
+    assert told.state[ARM[1]] == LiftState.OUTLIER
+    assert not told.lifted[ARM[1]]
+    assert told.scores[ARM[1]] < lifted.scores[ARM[1]]
+    others = np.delete(np.arange(15), ARM[1])
+    assert (told.lifted[others] == lifted.lifted[others]).all()
+    expected.sigma_m[ARM[1]] = 0.4  # nothing is known of it
+    assert reject_strangers(lifted, expected).lifted[ARM[1]]
+    assert reject_strangers(lifted, None) is lifted
 
 
 def test_candidate_is_the_body_that_its_parameters_pose(library):
