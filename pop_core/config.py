@@ -32,7 +32,7 @@ class PipelineConfig:
         about='Smallest share of the visible body that measured depth must agree with.')
     max_residual_m: float = setting(
         0.25, unit='m', minimum=0.02, maximum=2.0,
-        about='Largest distance of the best library pose to the lifted joints, root mean square.')
+        about='Largest distance of the best library pose to the joints, root mean square.')
     use_ground: bool = setting(
         True, about='Whether the floor is looked for: feet stand on it and never below it.')
     use_completion: bool = setting(

@@ -23,6 +23,7 @@ from pop_core.fitting.plausibility import plausibility
 from pop_core.fitting.uncertainty import Calibration, joint_covariance
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.detection import Detection, KeypointDetector
+from pop_core.keypoints.joint_belief import JointBelief
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.keypoints.lifting import lift_keypoints
 from pop_core.keypoints.region import is_inside
@@ -36,7 +37,7 @@ from pop_core.retrieval.retrieve import retrieve
 from pop_core.rgbd import RgbdFrame, distort_mask, undistort_frame
 from pop_core.segmentation.body_segmentation import segment_body, with_holes
 from pop_core.segmentation.depth_support import depth_support
-from pop_core.segmentation.ground import Ground, find_ground
+from pop_core.segmentation.ground import Ground, find_ground, ground_of
 from pop_core.stopwatch import Stopwatch
 
 SMALLEST_EXTENT_M = 0.15  # joints nearer together than this are no skeleton
@@ -61,6 +62,12 @@ class Scene:
     ground: Ground | None
     noise: DepthNoise
     taken: Bool[np.ndarray, 'h w']
+
+    def with_ground_of(
+        self, p_camera: Float[np.ndarray, 'n 3'], sigma_m: Float[np.ndarray, 'n']
+    ) -> Scene:
+        """Return the scene with the floor only if somebody's joints are not below it."""
+        return replace(self, ground=ground_of(self.ground, p_camera, sigma_m))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,8 +114,9 @@ class BodyPipeline:
         self.config = config or PipelineConfig()
         self.fitter = BodyFitter(
             model, prior or load_pose_prior(), self.config.fitting, self.config.segmentation)
-        self.completion = (
-            completion or load_completion() if self.config.use_completion else None)
+        self.completion = completion
+        if completion is None and self.config.use_completion:
+            self.completion = load_completion()
         # Small products are slower on several BLAS threads than on one.
         self._blas = ThreadpoolController()
 
@@ -216,25 +224,22 @@ class BodyPipeline:
         lifted: LiftedJoints,
         watch: Stopwatch,
     ) -> PersonFit:
-        """Lift what nearer people left, then retrieve, fit and segment one person."""
-        if covers_keypoints(scene.taken, detection):
-            with watch.step('lift'):
-                lifted = self.lift(without_depth(scene.frame, scene.taken), detection)
-            status = self.admit(lifted)
-            if status is not EstimateStatus.OK:
-                return PersonFit(status)
-        expected = None
-        if self.completion is not None:
-            with watch.step('complete'):
-                expected = self.completion.expected(
-                    scene.frame.depth_m, scene.frame.camera, detection)
-                lifted = reject_strangers(lifted, expected)
+        """Lift anew by what is expected, then retrieve, fit and segment one person."""
+        with watch.step('complete'):
+            lifted, expected = self._lifted_again(scene, detection, lifted)
+        status = self.admit(lifted)
+        if status is not EstimateStatus.OK:
+            return PersonFit(status)
+        # What is no floor of theirs is level all the same.
+        gravity = None if scene.ground is None else -scene.ground.normal
+        if expected is not None:
+            scene = scene.with_ground_of(expected.positions_camera, expected.sigma_m)
         with watch.step('observe'):
             observation = observe(
                 scene.frame, lifted, scene.taken, scene.ground, detection.part_labels,
                 scene.noise, expected=expected)
         with watch.step('retrieve'):
-            candidates = self._retrieve(lifted, observation, scene.frame.camera)
+            candidates = self._retrieve(lifted, observation, scene.frame.camera, gravity)
         if not candidates or candidates[0].residual_m > self.config.max_residual_m:
             return PersonFit(EstimateStatus.NO_SKELETON)
         with watch.step('fit'):
@@ -245,13 +250,32 @@ class BodyPipeline:
             return PersonFit(EstimateStatus.NO_SUPPORT)
         return PersonFit(EstimateStatus.OK, estimate, fit, observation)
 
-    def lift(self, frame: RgbdFrame, detection: Detection) -> LiftedJoints:
+    def lift(
+        self, frame: RgbdFrame, detection: Detection, expected: JointBelief | None = None
+    ) -> LiftedJoints:
         """Return the joints of a detection in 3D, without those that no pose explains."""
-        lifted = lift_keypoints(frame, detection, self.config.lifting)
+        lifted = lift_keypoints(frame, detection, self.config.lifting, expected)
         return reject_outliers(self.library, lifted, self.config.retrieval)
 
+    def _lifted_again(
+        self, scene: Scene, detection: Detection, lifted: LiftedJoints
+    ) -> tuple[LiftedJoints, JointBelief | None]:
+        """Return joints, lifted from what nearer people left, and where all are expected.
+
+        Whatever is expected that contradicts nearly all that was measured is of somebody else.
+        """
+        covered = covers_keypoints(scene.taken, detection)
+        frame = without_depth(scene.frame, scene.taken) if covered else scene.frame
+        if self.completion is not None and self.config.use_completion:
+            expected = self.completion.expected(scene.frame, detection, scene.taken)
+            near = reject_strangers(self.lift(frame, detection, expected), expected)
+            if self.admit(near) is EstimateStatus.OK:
+                return near, expected
+        return (self.lift(frame, detection) if covered else lifted), None
+
     def _retrieve(
-        self, lifted: LiftedJoints, observation: Observation, camera: Camera
+        self, lifted: LiftedJoints, observation: Observation, camera: Camera,
+        gravity: Float[np.ndarray, '3'] | None,
     ) -> Sequence[PoseCandidate]:
         def in_the_open_m(p_camera: Float[np.ndarray, 'n 3']) -> Float[np.ndarray, 'n']:
             """Return how far points stand in front of what the camera measured there."""
@@ -262,7 +286,6 @@ class BodyPipeline:
             # Nor can anything hide below the floor.
             return np.maximum(open_m, -observation.ground.height(p_camera))
 
-        gravity = None if observation.ground is None else -observation.ground.normal
         return retrieve(
             self.library, lifted, self.config.retrieval, hides=in_the_open_m, gravity=gravity,
             camera=camera, expected=observation.expected)

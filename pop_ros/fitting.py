@@ -48,4 +48,5 @@ def _loaded(models: ModelFiles) -> BodyPipeline:
 @lru_cache(maxsize=1)
 def _pipeline(models: ModelFiles, config: PipelineConfig) -> BodyPipeline:
     loaded = _loaded(models)
-    return BodyPipeline(loaded.model, loaded.library, Nobody(), config, loaded.fitter.prior)
+    return BodyPipeline(
+        loaded.model, loaded.library, Nobody(), config, loaded.fitter.prior, loaded.completion)

@@ -95,7 +95,8 @@ class FrameFitter:
         old = self._pipeline
         apply_settings(old.detector, pipeline_config)
         self._pipeline = BodyPipeline(
-            old.model, old.library, old.detector, pipeline_config, old.fitter.prior)
+            old.model, old.library, old.detector, pipeline_config, old.fitter.prior,
+            old.completion)
         self._tracker.configure(self._pipeline, config.tracking)
         self._messages.configure(config)
         self._configure_inputs(config)

@@ -47,6 +47,7 @@ def warm_up(pipeline: BodyPipeline) -> None:
     config = replace(pipeline.config, region=RegionConfig(), max_range_m=2 * PLACE[2])
     BodyPipeline(
         pipeline.model, pipeline.library, OnePerson(detection), config, pipeline.fitter.prior,
+        pipeline.completion,
     ).process(frame)
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int
+from jaxtyping import Bool, Float, Float32
 
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.detection import Detection
@@ -58,14 +58,16 @@ class PersonView:
 
 
 def view_person(
-    depth_m: Float32[np.ndarray, 'h w'], camera: Camera, detection: Detection
+    depth_m: Float32[np.ndarray, 'h w'], camera: Camera, detection: Detection,
+    taken: Bool[np.ndarray, 'h w'] | None = None,
 ) -> PersonView | None:
     """Return the view of a person, None when no depth was measured at any keypoint.
 
     Args:
         depth_m: Depth [m], NaN where nothing was measured.
-        camera: Camera without distortion.
+        camera: Camera without distortion, upright.
         detection: The person's keypoints.
+        taken: Pixels of others, who do not tell how far this person is; None for nobody's.
     """
     scores = detection.scores
     found = np.isfinite(detection.keypoints_px).all(axis=1) & (scores > 0)
@@ -73,7 +75,8 @@ def view_person(
         return None
     focal, centre = np.array([camera.fx, camera.fy]), np.array([camera.cx, camera.cy])
     rays = (np.where(found[:, None], detection.keypoints_px, centre) - centre) / focal
-    person_m = _person_depth(depth_m, detection.keypoints_px, scores, found)
+    own_m = depth_m if taken is None else np.where(taken, np.float32(np.nan), depth_m)
+    person_m = _person_depth(own_m, detection.keypoints_px, scores, found)
     if person_m is None:
         return None
     middle = (rays[found].min(axis=0) + rays[found].max(axis=0)) / 2
@@ -91,20 +94,15 @@ def _person_depth(
     scores: Float[np.ndarray, 's'], found: Bool[np.ndarray, 's'],
 ) -> float | None:
     """Return the median depth at keypoints [m], at those that are sure where there are any."""
-    for chosen in (found & (scores >= SURE_SCORE), found):
-        v, u = _pixels(keypoints_px[chosen, ::-1], depth_m.shape)
-        read = depth_m[v, u]
+    height, width = depth_m.shape
+    u, v = np.rint(np.where(found[:, None], keypoints_px, -1.0)).astype(np.int64).T
+    inside = (u >= 0) & (u < width) & (v >= 0) & (v < height)
+    for chosen in (inside & (scores >= SURE_SCORE), inside):
+        read = depth_m[v[chosen], u[chosen]]
         read = read[np.isfinite(read)]
         if len(read):
             return float(np.median(read))
     return None
-
-
-def _pixels(
-    rows_columns: Float[np.ndarray, 'n 2'], shape: tuple[int, ...]
-) -> tuple[Int[np.ndarray, 'n'], Int[np.ndarray, 'n']]:
-    v, u = np.clip(np.rint(rows_columns), 0, np.array(shape) - 1).astype(np.int64).T
-    return v, u
 
 
 def _window(

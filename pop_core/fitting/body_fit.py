@@ -140,7 +140,9 @@ class BodyFitter:
         window = observations[0]
         # One window for all: where another lies depends on what was lifted.
         read = [
-            replace(window, lifted=each.lifted, keypoint_rays=each.keypoint_rays)
+            replace(
+                window, lifted=each.lifted, keypoint_rays=each.keypoint_rays,
+                expected=each.expected)
             for each in observations]
         bodies = [
             Hypothesis(fit.coarse, PriorBelief(

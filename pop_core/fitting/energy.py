@@ -33,7 +33,7 @@ from pop_core.retrieval.pose_prior import PosePrior
 
 # Which of `BodyEnergy.terms` say what; those after the priors are pairs of E_NN.
 JOINT_BLOCKS = slice(0, 2)
-PRIOR_BLOCKS = slice(2, 8)
+PRIOR_BLOCKS = slice(3, 8)  # before them, where the joints are expected
 PAIR_BLOCKS = slice(8, None)
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
 from pop_core.body.joints import SHARED_MIRROR
-from pop_core.completion.joint_belief import JointBelief
 from pop_core.depth_noise import USUAL_NOISE, DepthNoise
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.body_parts import LABEL_MIRROR
+from pop_core.keypoints.joint_belief import JointBelief
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.rgbd import RgbdFrame, flying_pixels
 from pop_core.segmentation.ground import Ground

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from pop_core.completion.joint_belief import JointBelief
 from pop_core.fitting import keypoint_kernels
 from pop_core.fitting.body_state import BodyState
 from pop_core.fitting.levenberg_marquardt import Residual, no_residual
 from pop_core.fitting.observation import KeypointRays
 from pop_core.fitting.pair_kernels import merge, offsets
 from pop_core.fitting.robust_loss import Power, geman_mcclure_share
+from pop_core.keypoints.joint_belief import JointBelief
 from pop_core.keypoints.lifted_joints import LiftedJoints
 
-EXPECTED_SIGMAS = 3.0  # a joint farther from where it is expected keeps a quarter of the pull
+EXPECTED_SIGMAS = 3.0  # of a joint that keeps a quarter of its pull
 RAY_SCALE_M = 0.4  # a guessed pixel may be on another limb
 
 

@@ -15,6 +15,7 @@ from jaxtyping import Float, Float32, Int
 from pop_core.keypoints import lifting_kernels, skeleton_tree_kernels
 from pop_core.keypoints.bone_evidence import BONE_COSTS, MeasuredBones
 from pop_core.keypoints.depth_layers import DepthLayers
+from pop_core.keypoints.joint_belief import JointBelief
 from pop_core.keypoints.skeleton import LEGS, ORDER, PATH_M, TREE_PARENT
 
 BIN_M = 0.03
@@ -30,6 +31,7 @@ OCCLUDER_COST = 2.5  # a surface that stands clear in front of the one it should
 OCCLUDER_GAP_M = 0.25
 BONE_TOLERANCE_M = 0.05
 SHORTEST = 0.75  # bone relative to the mean one: keypoints and skin err at both ends
+UNEXPECTED_COST, EXPECTED_TOLERANCE_M = 4.0, 0.05  # who believes something may be wrong
 LEAN = 0.75  # spread of a bone's depth relative to its length, over varied poses
 
 
@@ -84,6 +86,8 @@ def choose_depths(
     bones: MeasuredBones,
     size: float,
     stretch: float,
+    *,
+    expected: JointBelief | None = None,
 ) -> Float[np.ndarray, 's']:
     """Return the most probable depth of each joint [m], hidden ones included; NaN without surface.
 
@@ -94,14 +98,18 @@ def choose_depths(
         bones: What hangs on what, and the depth between.
         size: Size of the person relative to the mean default body.
         stretch: Longest bone relative to the mean one of that size.
+        expected: What is believed of the joints already.
     """
     present = joints.layers.present
     bins = _bins(joints.depth_m[present])
     usable = joints.layers.known
     order = np.array([j for j in ORDER if usable[j]])
     chosen = np.zeros(len(scores), dtype=np.int64)
+    cost = _unary(joints, bins, scores)
+    if expected is not None:
+        cost += _surprise(expected, bins)
     skeleton_tree_kernels.tree_depths(
-        _unary(joints, bins, scores), bins, rays, bones.links, order,
+        cost, bins, rays, bones.links, order,
         _limits(bones.links, size, stretch), BONE_TOLERANCE_M, BROKEN_BONE_COST, bones.depth_m,
         joints.skin_m, BONE_COSTS, chosen)
     return np.where(usable, bins[chosen], np.nan)
@@ -144,6 +152,13 @@ def _unary(
     hidden = np.where(gap > 0, hidden_price(joints.layers, scores)[..., None], np.inf)
     each = np.where(present[..., None], np.minimum(behind, hidden), np.inf)
     return np.minimum(each.min(axis=1), WRONG_COST) * (0.3 + 0.7 * scores[:, None])
+
+
+def _surprise(expected: JointBelief, bins: Float[np.ndarray, 'm']) -> Float[np.ndarray, 's m']:
+    """Return the cost of each joint at each depth for being elsewhere than is believed."""
+    sigma_m = np.hypot(expected.sigma_m, EXPECTED_TOLERANCE_M)[:, None]
+    off = (bins - expected.positions_camera[:, 2:]) / sigma_m
+    return np.minimum(0.5 * off**2, UNEXPECTED_COST)
 
 
 def hidden_price(

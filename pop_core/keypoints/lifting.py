@@ -11,6 +11,7 @@ from pop_core.geometry.camera import Camera
 from pop_core.keypoints.bone_evidence import MeasuredBones, depths_along_bones
 from pop_core.keypoints.depth_layers import DepthLayers, find_layers
 from pop_core.keypoints.detection import Detection
+from pop_core.keypoints.joint_belief import JointBelief
 from pop_core.keypoints.joint_depths import (
     JointLayers,
     choose_depths,
@@ -63,7 +64,8 @@ class LiftingConfig:
 
 
 def lift_keypoints(
-    frame: RgbdFrame, detection: Detection, config: LiftingConfig | None = None
+    frame: RgbdFrame, detection: Detection, config: LiftingConfig | None = None,
+    expected: JointBelief | None = None,
 ) -> LiftedJoints:
     """Return each keypoint as a joint in 3D, or the reason why it has none (step 3: J_3D).
 
@@ -75,6 +77,7 @@ def lift_keypoints(
         frame: Colour and depth without lens distortion.
         detection: One person; depth, visibility and mask are used where the source gives them.
         config: Settings; None takes the defaults.
+        expected: Where the joints are expected: of several surfaces the one near that is likelier.
     """
     config = config or LiftingConfig()
     keypoints_px, scores = _detected(detection, config.min_score)
@@ -94,7 +97,7 @@ def lift_keypoints(
     state = np.full(len(pixels), int(LiftState.MISSING))
     if layers.known.any():
         position, sigma_m, state = _lift(
-            _View(frame, pixels, rays, scores, layers, prices, bones), config)
+            _View(frame, pixels, rays, scores, layers, prices, bones, expected), config)
     lifted = LiftedJoints(position, sigma_m, state, keypoints_px, scores)
     return _with_given(detection, frame.camera, lifted)
 
@@ -125,6 +128,7 @@ class _View:
     layers: DepthLayers
     prices: Float[np.ndarray, 's l']
     bones: MeasuredBones
+    expected: JointBelief | None
 
 
 def _lift(
@@ -139,7 +143,8 @@ def _lift(
     for _ in range(2):
         joints = _behind_skin(view, scale, facing_share, config)
         depth_m = choose_depths(
-            joints, view.rays, view.scores, view.bones, scale, config.stretch)
+            joints, view.rays, view.scores, view.bones, scale, config.stretch,
+            expected=view.expected)
         chosen = nearest_layer(joints, depth_m)
         state = _states(joints, depth_m, chosen, view.scores)
         at_joint = joints.depth_m[rows, chosen]

@@ -68,9 +68,12 @@ class OnnxSession:
         Raises:
             NetworkShapeError: If the network fails, or gives other shapes than it declares.
         """
+        if len(tensors) != len(self.spec.inputs):
+            raise NetworkShapeError(
+                f'{self.where}: expected {len(self.spec.inputs)} inputs, found {len(tensors)}')
         inputs = {
             entry.name: tensor.astype(entry.dtype, copy=False) if entry.dtype in FLOATS else tensor
-            for entry, tensor in zip(self.spec.inputs, tensors, strict=False)}
+            for entry, tensor in zip(self.spec.inputs, tensors, strict=True)}
         options = onnxruntime.RunOptions()
         alarm = Timer(self.longest_s, setattr, (options, 'terminate', True))
         alarm.daemon = True

@@ -56,12 +56,26 @@ def turned_back(detection: Detection, camera: Camera) -> Detection:
 
 def upright_box(box: PersonBox, camera: Camera) -> PersonBox:
     """Return a box of the camera's image in the pixels of the upright one."""
+    return PersonBox(_around(upright_pixels(box.box_px.reshape(2, 2), camera)), box.score)
+
+
+def upright_pixels(uv: Float[np.ndarray, 'n 2'], camera: Camera) -> Float[np.ndarray, 'n 2']:
+    """Return pixels (u, v) of the camera's image in the upright one."""
     width, height = camera.width, camera.height
-    corners = box.box_px.reshape(2, 2)
     for _ in range(camera.quarter_turns):
-        corners = np.column_stack([corners[:, 1], width - 1 - corners[:, 0]])
+        uv = np.column_stack([uv[:, 1], width - 1 - uv[:, 0]])
         width, height = height, width
-    return PersonBox(_around(corners), box.score)
+    return uv
+
+
+def points_turned_back(
+    points: Float[np.ndarray, 'n 3'], camera: Camera
+) -> Float[np.ndarray, 'n 3']:
+    """Return points of the upright camera's frame in the camera's own."""
+    x, y, z = points.T
+    for _ in range(camera.quarter_turns):
+        x, y = -y, x
+    return np.column_stack([x, y, z])
 
 
 def box_turned_back(box: PersonBox, camera: Camera) -> PersonBox:

@@ -18,7 +18,7 @@ class PoseCandidate:
         scale: Scale of the similarity, body to camera, times the library body's size.
         R_camera_body: Rotation of the similarity (no reflection).
         t_camera_body: Translation of the similarity [m].
-        residual_m: Weighted RMS distance to the lifted joints [m].
+        residual_m: Weighted RMS distance to the joints that were lifted or are expected [m].
         weight: Share of belief among the returned candidates, summing to one.
         index: Row in the library.
     """

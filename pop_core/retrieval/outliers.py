@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 
-from pop_core.completion.joint_belief import JointBelief
+from pop_core.keypoints.joint_belief import JointBelief
 from pop_core.keypoints.lifted_joints import LiftedJoints, LiftState
 from pop_core.retrieval.pose_library import PoseLibrary
 from pop_core.retrieval.procrustes import rank_similarities
@@ -58,7 +58,7 @@ def reject_outliers(
 def reject_strangers(lifted: LiftedJoints, expected: JointBelief | None) -> LiftedJoints:
     """Return lifted joints without those that are far from where they are expected.
 
-    What is expected was told by who saw the keypoint and what surrounds it.
+    Where joints are expected was told with the keypoints and all depth around them in view.
 
     Args:
         lifted: Lifted joints of one person.

@@ -1,8 +1,9 @@
 """Occlusion-aware retrieval: K diverse library poses that explain the lifted joints (step 4).
 
 Every pose of the library is placed by the best weighted similarity of Eq. (1) on the joints that
-were lifted; the best are ranked again by what is known of the joints that were not: the ray of a
-pixel, and whether the scene can hide them where the pose puts them.
+were lifted, and on those that are expected somewhere; the best are ranked again by what else is
+known of the joints that were not lifted: the ray of a pixel, and whether the scene can hide them
+where the pose puts them.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ from typing import TypedDict
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from pop_core.completion.joint_belief import JointBelief
 from pop_core.geometry.camera import Camera
 from pop_core.geometry.rotation import from_rotvec
+from pop_core.keypoints.joint_belief import JointBelief
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.retrieval import diversity_kernels as kernels
 from pop_core.retrieval.candidate import PoseCandidate
@@ -109,12 +110,10 @@ def retrieve(
     if int(seen.sum()) < MIN_JOINTS:
         return []
     known = completed(lifted, expected)
-    used = known.lifted
-    weight = np.zeros(len(seen))
-    weight[used] = 1.0 / (known.sigma_m[used] ** 2 + config.pose_sigma_m**2)
+    used, weight = known.lifted, _precision(known, config)
     R_camera_up = _upright_frame(gravity)
     rules = _placement_rules(gravity is not None, weight, config)
-    shortlist = _shortlist(library, known, weight, config, R_camera_up, rules)
+    shortlist = _shortlist(library, known, seen, config, R_camera_up, rules)
     joints = np.asarray(library.joints[shortlist], dtype=np.float64)
     placed = solve_similarities(
         joints[:, used], known.positions_camera[used] @ R_camera_up, weight[used],
@@ -213,23 +212,31 @@ def choose_diverse(
 
 def _shortlist(
     library: PoseLibrary,
-    lifted: LiftedJoints,
-    weight: Float[np.ndarray, 's'],
+    known: LiftedJoints,
+    seen: Bool[np.ndarray, 's'],
     config: RetrievalConfig,
     R_camera_up: Float[np.ndarray, '3 3'],
     rules: PlacementRules,
 ) -> Int[np.ndarray, 'k']:
     """Return the best poses by Eq. (1), best first."""
     costs: Float32[np.ndarray, 'm'] = rank_similarities(
-        library.columns, lifted.positions_camera @ R_camera_up, weight,
+        library.columns, known.positions_camera @ R_camera_up, _precision(known, config),
         (config.smallest_scale, config.largest_scale),
         threads=config.threads, **rules)
     if config.same_visibility:
-        same = library.masks == visibility_mask(lifted.lifted)
+        same = library.masks == visibility_mask(seen)
         if same.any():
             costs[~same] = np.inf
     best = best_indices(costs, config.shortlist)
     return best[np.isfinite(costs[best])]
+
+
+def _precision(known: LiftedJoints, config: RetrievalConfig) -> Float[np.ndarray, 's']:
+    """Return the weights of Eq. (1): zero for joints that are nowhere."""
+    used = known.lifted
+    weight = np.zeros(len(used))
+    weight[used] = 1.0 / (known.sigma_m[used] ** 2 + config.pose_sigma_m**2)
+    return weight
 
 
 def _placement_rules(

@@ -21,6 +21,7 @@ ALIKE_COS = 0.85
 NARROWINGS = (1.0, 0.6, 0.4)  # of the inlier band, refinement by refinement
 MIN_SHARE = 0.02  # of all measured points
 MAX_BELOW = 0.005  # share of points that may lie below a floor: mirrors, noise
+SURELY_BELOW = 1.5  # standard deviations; joints of people on their floor stay above a third
 BELOW_WIDTHS = 3.0  # surely below: this many widths of the plane
 LOOSE_BELOW = 0.02  # the same for a proposal, whose normal is one noisy pixel's
 
@@ -93,6 +94,23 @@ def find_ground(frame: RgbdFrame, tries: int = 60) -> Ground | None:
         support[np.abs(ground.height(on_plane)) < width[proposals]] = 0.0
         support[best] = 0.0
     return None
+
+
+def ground_of(
+    ground: Ground | None, p_camera: Float[np.ndarray, 'n 3'], sigma_m: Float[np.ndarray, 'n']
+) -> Ground | None:
+    """Return the floor as somebody's who is not below it, else None.
+
+    Where a sofa or a table hides all that lies below it, its top looks like a floor.
+
+    Args:
+        ground: What was found, or None.
+        p_camera: Where the person's joints are expected [m].
+        sigma_m: Their standard deviations [m].
+    """
+    if ground is None or (ground.height(p_camera) < -SURELY_BELOW * sigma_m).any():
+        return None
+    return ground
 
 
 def _upward(

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pop_core.body.joints import N_SHARED
 from pop_core.estimate import BodyEstimate
 from pop_core.fitting.body_fit import BodyFit
 from pop_core.fitting.body_state import BodyState
@@ -46,6 +47,7 @@ MIN_SEEN = 0.04  # share of the body that must be seen for the frame to say anyt
 CONTRADICTED = 0.4  # a body is not where the camera saw through this share of it
 USUAL_SHARE = 0.05  # how fast the usual E_depth follows
 TRUSTED_SUPPORT = 0.5
+JOINT_SIGMA_M = 0.1  # of joints that are below what seems to be the floor
 HIDDEN_TURN_RAD = 0.5  # people hidden for a while come out much as they went in
 
 
@@ -96,6 +98,7 @@ class Follower:
         if lifted is not None:
             track.misnamed = misnamed_joints(body.landmarks, lifted)
             lifted = lifted.with_sides_exchanged(track.misnamed)
+        scene = scene.with_ground_of(body.landmarks, np.full(N_SHARED, JOINT_SIGMA_M))
         observation = observe_track(
             scene.frame, scene.ground, scene.taken, body, track.joint_state, lifted,
             noise=scene.noise)

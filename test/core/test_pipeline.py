@@ -7,11 +7,13 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from pop_core.body.default_body import default_body
+from pop_core.completion.joint_completion import JointCompletion, load_completion
 from pop_core.config import PipelineConfig
 from pop_core.depth_noise import USUAL_NOISE
 from pop_core.estimate import EstimateStatus, FrameResult, JointState
 from pop_core.fitting.body_fit import BodyFit, BodyFitter
 from pop_core.keypoints.detection import Detection
+from pop_core.keypoints.joint_belief import JointBelief
 from pop_core.keypoints.region import RegionConfig
 from pop_core.pipeline import BodyPipeline, PersonFit, Scene
 from pop_core.retrieval.default_library import default_library
@@ -192,3 +194,43 @@ def test_people_outside_the_region_of_interest_are_left_alone(
     assert len(found.bodies) == 1
     np.testing.assert_allclose(found.bodies[0].joints, result.bodies[0].joints, atol=1e-9)
     assert sorted(status.name for status in found.statuses) == ['OK', 'OUTSIDE']
+
+
+class Told(JointCompletion):
+    """A completion network that is asked, and of whose answers another thing is said."""
+
+    def __init__(self, off_m: float, sigma_m: float | None = None) -> None:
+        super().__init__(load_completion().session)
+        self.off_m, self.sigma_m, self.asked = off_m, sigma_m, 0
+
+    def expected(self, *arguments: Any) -> JointBelief | None:
+        self.asked += 1
+        belief = super().expected(*arguments)
+        if belief is None:
+            return None
+        sigma_m = belief.sigma_m if self.sigma_m is None else np.full(15, self.sigma_m)
+        return JointBelief(belief.positions_camera + [self.off_m, 0.0, 0.0], sigma_m)
+
+
+def test_hidden_joints_are_asked_for_unless_that_is_off(scene: SyntheticScene) -> None:
+    detections = [d for d in scene.detections() if d is not None]
+    for use, asked in ((True, 2), (False, 0)):
+        told = Told(0.0)
+        pipeline = BodyPipeline(
+            default_body(), default_library(), Given(detections),
+            PipelineConfig(use_completion=use), completion=told)
+        assert len(pipeline.process(scene.frame).bodies) == 2
+        assert told.asked == asked
+
+
+@pytest.mark.parametrize('off_m', [0.2, 3.0])
+def test_a_network_that_is_sure_and_wrong_leaves_people_where_they_are(
+    scene: SyntheticScene, result: FrameResult, off_m: float
+) -> None:
+    detections = [d for d in scene.detections() if d is not None]
+    pipeline = BodyPipeline(
+        default_body(), default_library(), Given(detections), completion=Told(off_m, 0.01))
+    found = pipeline.process(scene.frame)
+    assert len(found.bodies) == len(result.bodies)
+    for body, usual in zip(found.bodies, result.bodies, strict=True):
+        assert np.linalg.norm(body.joints[0] - usual.joints[0]) < 0.1

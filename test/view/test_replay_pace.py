@@ -88,11 +88,11 @@ def listener() -> Iterator[Listener]:
     made.close()
 
 
-def play(recording: Recording, bag: Path, out: Path, *arguments: str) -> subprocess.Popen[str]:
+def play(bag: Path, out: Path, *arguments: str) -> subprocess.Popen[str]:
     """Play a bag to the node that runs; standard input is a pipe."""
     return subprocess.Popen(
-        [sys.executable, '-m', 'pop_ros.cli', 'replay', str(bag), '--node-running', '--keypoints',
-         'json', '--keypoints-dir', str(recording.keypoints), '--out', str(out), *arguments],
+        [sys.executable, '-m', 'pop_ros.cli', 'replay', str(bag), '--node-running',
+         '--out', str(out), *arguments],
         env={**os.environ, 'PYTHONPATH': str(ROOT)}, text=True, stdin=subprocess.PIPE,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
@@ -115,7 +115,7 @@ def test_a_loop_goes_on_until_ctrl_c_and_records_one_round(
     recording: Recording, node: RunningNode, listener: Listener, tmp_path: Path
 ) -> None:
     bag = recording.write(tmp_path / 'in.mcap', '16UC1')
-    process = play(recording, bag, tmp_path / 'out', '--loop', '--rate', '0.5')
+    process = play(bag, tmp_path / 'out', '--loop', '--rate', '0.5')
     listener.wait_for(lambda: len(listener.stamps) >= 5, process)
     process.send_signal(signal.SIGINT)
     said, complained = process.communicate(timeout=30)
@@ -132,7 +132,7 @@ def test_ctrl_c_keeps_what_was_fitted_so_far(
     recording: Recording, node: RunningNode, listener: Listener, tmp_path: Path
 ) -> None:
     bag = recording.write(tmp_path / 'in.mcap', '16UC1')
-    process = play(recording, bag, tmp_path / 'out', '--step', '--clock')
+    process = play(bag, tmp_path / 'out', '--step', '--clock')
     press_enter(process, listener)
     listener.wait_for(lambda: listener.depths == 1 and listener.clock_stands(), process)
     assert listener.stamps == recording.stamps[:1]
@@ -147,7 +147,7 @@ def test_every_step_lets_one_frame_pass_while_the_clock_stands(
     recording: Recording, node: RunningNode, listener: Listener, tmp_path: Path
 ) -> None:
     bag = recording.write(tmp_path / 'in.mcap', '16UC1')
-    process = play(recording, bag, tmp_path / 'out', '--step', '--clock')
+    process = play(bag, tmp_path / 'out', '--step', '--clock')
     press_enter(process, listener)
     listener.wait_for(lambda: listener.depths == 1 and listener.clock_stands(), process)
     assert listener.stamps == recording.stamps[:1]
@@ -201,7 +201,7 @@ def test_inputs_and_transforms_go_along_and_sqlite_holds_the_same(
     recording: Recording, node: RunningNode, tmp_path: Path
 ) -> None:
     bag = write_frames(tmp_path / 'in.db3', [recording.scenes[0].frame], '16UC1')
-    process = play(recording, bag, tmp_path / 'out', '--inputs', '--storage', 'sqlite3',
+    process = play(bag, tmp_path / 'out', '--inputs', '--storage', 'sqlite3',
                    '--ros1', str(tmp_path / 'out.bag'))
     _, complained = process.communicate(timeout=60)
     assert process.returncode == 0, complained

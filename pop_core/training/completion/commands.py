@@ -11,6 +11,8 @@ import typer
 
 from pop_core.training.completion.export import export_onnx
 from pop_core.training.completion.trainer import CompletionTrainer, train
+from pop_core.training.completion.validation import error_table
+from pop_core.training.completion.view_pool import load_pool
 from pop_core.training.completion.views import write_views
 
 app = typer.Typer(
@@ -52,6 +54,19 @@ def train_command(
         trainer.load(out)
         typer.echo(f'going on after {trainer.views} views')
     train(trainer, views, validation, out, minutes, typer.echo)
+
+
+@app.command()
+def validate(
+    checkpoint: Annotated[Path, typer.Argument(help='What train wrote.')],
+    views: Annotated[Path, typer.Option('--views', help='Packed views of another seed.')],
+) -> None:
+    """Print how far off joints are, by how many of a person's joints are seen."""
+    trainer = CompletionTrainer()
+    trainer.load(checkpoint)
+    typer.echo(f'after {trainer.views} views')
+    for line in error_table(trainer.averaged, load_pool(views)):
+        typer.echo(line)
 
 
 @app.command()

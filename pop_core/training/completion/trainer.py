@@ -1,24 +1,19 @@
-"""One training of the completion network: views varied, steps, averaged weights, state on disk."""
+"""One training of the completion network: steps, averaged weights, state on disk."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from copy import deepcopy
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import torch
-from jaxtyping import Float, Int
-from torch import Tensor
 
-from pop_core.body.joints import SHARED_MIRROR
-from pop_core.completion.person_view import RELIEF_M
 from pop_core.training.completion.network import CompletionNet, completion_loss
-from pop_core.training.completion.views import OUTSIDE, STEPS, PackedViews, load_views
+from pop_core.training.completion.validation import figures
+from pop_core.training.completion.view_pool import Views, load_pool, varied
 from pop_core.training.muon import Muon
-from pop_core.training.shards import shard_paths
 from pop_core.training.trainer import CheckpointError, has_bfloat16
 
 BATCH = 128
@@ -27,74 +22,7 @@ WARM_UP = 100  # steps
 AVERAGE = 0.998  # of the old average kept per step
 COOLDOWN = 0.5  # share of a run, at its end, in which the rates fall to nothing
 CLIP = 1.0
-FEWER_SHARE, FEWER = 0.3, 0.25  # views from which keypoints are taken, and how many of them
-SCORE_SPREAD = 0.08  # other sources' scores mean something else
-DEPTH_SPREAD_M = 0.06  # the person's depth is a guess
 REPORT_S = 60.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Views:
-    """A batch of views as the network takes them, and the truth."""
-
-    relief_m: Float[Tensor, 'n h w']
-    measured: Float[Tensor, 'n h w']
-    keypoints: Float[Tensor, 'n 15 f']
-    places: Float[Tensor, 'n 15 3']
-
-
-class ViewPool:
-    """All views of some files, in memory."""
-
-    def __init__(self, packed: Sequence[PackedViews]) -> None:
-        """Take views."""
-        self.relief, self.keypoints, self.places, self.state = (
-            torch.cat([torch.from_numpy(getattr(views, name)) for views in packed])
-            for name in ('relief', 'keypoints', 'places', 'state'))
-
-    def __len__(self) -> int:
-        """Return the number of views."""
-        return len(self.relief)
-
-    def at(self, rows: Int[Tensor, 'n']) -> Views:
-        """Return given views."""
-        coded = self.relief[rows]
-        known = coded > OUTSIDE
-        measured = known.float() - (coded == OUTSIDE).float()
-        relief_m = torch.where(known, coded.float() * (RELIEF_M / STEPS), 0.0)
-        return Views(relief_m, measured, self.keypoints[rows], self.places[rows])
-
-
-def varied(views: Views, generator: torch.Generator) -> Views:
-    """Return views with some mirrored, keypoints missing, and depths a little off."""
-    n = len(views.places)
-    views = _mirrored(views, torch.rand(n, generator=generator) < 0.5)
-    keypoints = views.keypoints
-    fewer = torch.rand(n, 1, generator=generator) < FEWER_SHARE
-    lost = fewer & (torch.rand(keypoints.shape[:2], generator=generator) < FEWER)
-    off = SCORE_SPREAD * torch.randn(n, 1, generator=generator)
-    scores = (keypoints[..., 2] + off).clamp(0.05, 1.0) * keypoints[..., 3]
-    farther = DEPTH_SPREAD_M * torch.randn(n, 1, generator=generator)
-    beneath = (keypoints[..., 4] + farther) * keypoints[..., 5]
-    changed = torch.stack([scores, keypoints[..., 3], beneath, keypoints[..., 5]], dim=2)
-    keypoints = torch.cat([keypoints[..., :2], changed], dim=2) * ~lost[..., None]
-    relief_m = (views.relief_m + farther[..., None]).clamp(-RELIEF_M, RELIEF_M)
-    places = views.places.clone()
-    places[..., 2] += farther
-    return Views(relief_m * (views.measured > 0), views.measured, keypoints, places)
-
-
-def _mirrored(views: Views, chosen: Tensor) -> Views:
-    """Return views of which some are seen in a mirror: left is right."""
-    other = torch.as_tensor(SHARED_MIRROR)
-    side = torch.ones(views.keypoints.shape[2])
-    side[0] = -1.0
-    one, two = chosen[:, None, None], chosen[:, None, None]
-    return Views(
-        torch.where(one, views.relief_m.flip(2), views.relief_m),
-        torch.where(one, views.measured.flip(2), views.measured),
-        torch.where(two, views.keypoints[:, other] * side, views.keypoints),
-        torch.where(two, views.places[:, other] * side[:3], views.places))
 
 
 class CompletionTrainer:
@@ -175,9 +103,8 @@ def train(
     say: Callable[[str], None],
 ) -> None:
     """Train on the views of a folder for some minutes; `say` is told a line a minute."""
-    pool = ViewPool([load_views(path) for path in shard_paths(folder)])
-    held_out = None if validation is None else ViewPool(
-        [load_views(path) for path in shard_paths(validation)])
+    pool = load_pool(folder)
+    held_out = None if validation is None else load_pool(validation)
     generator = torch.Generator().manual_seed(trainer.views)
     begin = told = time.monotonic()
     end, losses = begin + 60.0 * minutes, []
@@ -195,16 +122,3 @@ def train(
     trainer.save(out)
     if held_out is not None:
         say(figures(trainer.averaged, held_out))
-
-
-@torch.no_grad()
-def figures(network: CompletionNet, pool: ViewPool) -> str:
-    """Return mean and median errors of visible and hidden joints [mm] as a line."""
-    off_m = torch.cat([
-        (network(v.relief_m, v.measured, v.keypoints).places - v.places).norm(dim=2)
-        for v in (pool.at(rows) for rows in torch.arange(len(pool)).split(2 * BATCH))])
-    visible = pool.state == 0
-    words = (
-        f'{name} {1e3 * off_m[rows].mean():.1f} mm mean, {1e3 * off_m[rows].median():.1f} median'
-        for name, rows in (('visible', visible), ('hidden', ~visible)))
-    return ', '.join(words)

@@ -1,5 +1,7 @@
 """The embedded completion network knows people, and says how well."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.onnx_files import save_network
@@ -11,6 +13,8 @@ from pop_core.errors import NetworkShapeError
 from pop_core.estimate import JointState
 from pop_core.geometry.camera import Camera
 from pop_core.keypoints.detection import Detection
+from pop_core.keypoints.upright import points_turned_back, turned_back, upright_frame
+from pop_core.rgbd import RgbdFrame
 from pop_core.synthesis.scene_config import SceneConfig
 from pop_core.synthesis.scenes import synthesise_scene
 
@@ -29,7 +33,7 @@ def told(completion):
     for seed in SEEDS:
         scene = synthesise_scene(default_body(), seed, SceneConfig(colour=False))
         for person, detection in zip(scene.people, scene.detections(), strict=True):
-            belief = completion.expected(scene.frame.depth_m, scene.frame.camera, detection)
+            belief = completion.expected(scene.frame, detection)
             off = np.linalg.norm(belief.positions_camera - person.shared_points, axis=1)
             seen = person.shared_state == JointState.VISIBLE
             rows.append(np.column_stack([off, belief.sigma_m, seen]))
@@ -52,7 +56,7 @@ def test_it_knows_how_far_off_it_may_be(told):
 def test_a_mirrored_person_has_mirrored_joints(completion):
     scene = synthesise_scene(default_body(), SEEDS[0], SceneConfig(colour=False))
     detection, camera = scene.detections()[0], scene.frame.camera
-    here = completion.expected(scene.frame.depth_m, camera, detection)
+    here = completion.expected(scene.frame, detection)
     other = Camera(camera.width, camera.height, camera.fx, camera.fy,
                    camera.width - 1 - camera.cx, camera.cy)
     pixels = detection.keypoints_px[SHARED_MIRROR]
@@ -60,19 +64,58 @@ def test_a_mirrored_person_has_mirrored_joints(completion):
     left, top, right, bottom = detection.box_px
     box = np.array([camera.width - 1 - right, top, camera.width - 1 - left, bottom])
     mirrored = Detection(pixels, detection.scores[SHARED_MIRROR], box)
-    depth_m = np.ascontiguousarray(scene.frame.depth_m[:, ::-1])
-    there = completion.expected(depth_m, other, mirrored).with_sides_exchanged()
+    frame = replace(
+        scene.frame, depth_m=np.ascontiguousarray(scene.frame.depth_m[:, ::-1]), camera=other)
+    there = completion.expected(frame, mirrored).with_sides_exchanged()
     expected = here.positions_camera * [-1.0, 1.0, 1.0]
     assert np.median(np.linalg.norm(there.positions_camera - expected, axis=1)) < 0.04
+
+
+@pytest.mark.parametrize('turns', [1, 2, 3])
+def test_cameras_on_their_side_see_the_same(completion, turns):
+    scene = synthesise_scene(default_body(), SEEDS[0], SceneConfig(colour=False))
+    detection, upright = scene.detections()[0], scene.frame
+    camera = upright.camera
+    for _ in range(4 - turns):  # what the upright image is turned from
+        camera = camera.turned()
+    mounted = RgbdFrame(
+        np.rot90(upright.rgb, -turns), np.ascontiguousarray(np.rot90(upright.depth_m, -turns)),
+        replace(camera, quarter_turns=turns), upright.stamp_ns)
+    assert upright_frame(mounted).camera.sees_like(upright.camera)
+    there = completion.expected(mounted, turned_back(detection, mounted.camera))
+    here = completion.expected(upright, detection)
+    back = points_turned_back(here.positions_camera, mounted.camera)
+    assert np.allclose(there.positions_camera, back, atol=1e-3)
+    assert np.allclose(
+        mounted.camera.project(back), turned_back(
+            replace(detection, keypoints_px=upright.camera.project(here.positions_camera)),
+            mounted.camera).keypoints_px, atol=1e-6)
 
 
 def test_nobody_is_expected_where_nothing_was_measured(completion):
     scene = synthesise_scene(default_body(), SEEDS[0], SceneConfig(colour=False))
     nothing = np.full_like(scene.frame.depth_m, np.nan)
-    assert completion.expected(nothing, scene.frame.camera, scene.detections()[0]) is None
+    empty = replace(scene.frame, depth_m=nothing)
+    assert completion.expected(empty, scene.detections()[0]) is None
 
 
 def test_another_network_is_refused(tmp_path):
     path = save_network(tmp_path / 'other.onnx', {'places': np.zeros((1, 15, 3), np.float32)})
     with pytest.raises(NetworkShapeError, match='expected a completion network'):
         load_completion(path)
+
+
+def test_a_network_that_says_no_numbers_is_told(completion, monkeypatch):
+    scene = synthesise_scene(default_body(), SEEDS[0], SceneConfig(colour=False))
+    says = [np.full((1, 15, 3), np.nan, np.float32), np.zeros((1, 15), np.float32)]
+    monkeypatch.setattr(completion.session, 'run', lambda *_: says)
+    with pytest.raises(NetworkShapeError, match='expected numbers'):
+        completion.expected(scene.frame, scene.detections()[0])
+
+
+def test_nothing_is_told_to_the_millimetre(completion, monkeypatch):
+    scene = synthesise_scene(default_body(), SEEDS[0], SceneConfig(colour=False))
+    says = [np.zeros((1, 15, 3), np.float32), np.full((1, 15), -1000.0, np.float32)]
+    monkeypatch.setattr(completion.session, 'run', lambda *_: says)
+    belief = completion.expected(scene.frame, scene.detections()[0])
+    assert (belief.sigma_m == 0.01).all()

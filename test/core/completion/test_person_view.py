@@ -109,6 +109,23 @@ def test_a_guess_on_an_occluder_does_not_say_how_far_the_person_is():
     assert view_person(depth_m, CAMERA, guessed).depth_m == 1.0
 
 
+def test_who_stands_in_front_does_not_say_how_far_the_person_is():
+    depth_m = wall(3.0)
+    depth_m[:, 120:200] = 1.5
+    behind = somebody({0: (110, 100), 5: (130, 150), 7: (140, 90), 9: (150, 95)})
+    assert view_person(depth_m, CAMERA, behind).depth_m == 1.5
+    view = view_person(depth_m, CAMERA, behind, taken=depth_m < 2.0)
+    assert view.depth_m == 3.0
+    assert view.relief_m.min() == np.float32(-RELIEF_M)  # and yet is seen
+
+
+def test_keypoints_beyond_the_image_are_nowhere_near_its_border():
+    depth_m = wall(3.0)
+    depth_m[:, -1] = 9.0
+    half = somebody({0: (310, 100), 5: (400, 150), 7: (410, 90), 9: (420, 95)})
+    assert view_person(depth_m, CAMERA, half).depth_m == 3.0
+
+
 def test_nothing_is_shown_of_nobody():
     assert view_person(wall(2.0), CAMERA, somebody({})) is None
     assert view_person(wall(np.nan), CAMERA, somebody({0: (100, 100), 7: (90, 80)})) is None

@@ -19,6 +19,7 @@ from pop_core.fitting.fitting_config import FittingConfig
 from pop_core.fitting.observation import observe
 from pop_core.fitting.uncertainty import joint_covariance
 from pop_core.geometry.rotation import from_rotvec
+from pop_core.keypoints.joint_belief import JointBelief
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.rendering.depth_renderer import render_depth
 from pop_core.retrieval.candidate import PoseCandidate
@@ -176,14 +177,17 @@ def test_a_body_costs_by_its_own_reading_of_the_keypoints(
     fitter: BodyFitter, body: BodyModel, person: BodyParameters
 ) -> None:
     frame, lifted = photograph(body, person), lift_truth(body, person)
-    named = observe(frame, lifted, NOBODY)
-    exchanged = observe(frame, lifted.with_sides_exchanged(), NOBODY)
+    expected = JointBelief(lifted.positions_camera, np.full(15, 0.1))
+    named = observe(frame, lifted, NOBODY, expected=expected)
+    exchanged = named.with_sides_exchanged()
     body_fit = fit(fitter, frame, lifted, [disturbed(person, 0, 0.1)])
     turned = replace(body_fit, sides_exchanged=True)
     as_named, as_exchanged, undone = fitter.costs(
         [body_fit, body_fit, turned], [named, exchanged, exchanged])
     assert as_named < as_exchanged
     assert undone == pytest.approx(as_named)
+    silent = replace(exchanged, expected=expected)
+    assert fitter.costs([body_fit], [silent])[0] < as_exchanged
 
 
 def test_points_recognised_as_a_far_part_do_not_pull(

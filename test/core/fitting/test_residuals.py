@@ -6,7 +6,6 @@ from support.derivatives import assert_is_derivative, assert_is_gradient
 from support.one_person import CAMERA, lift_truth
 
 from pop_core.body.model import BodyModel, BodyParameters
-from pop_core.completion.joint_belief import JointBelief
 from pop_core.fitting.body_state import BodyState, FitBody
 from pop_core.fitting.levenberg_marquardt import assemble, cost_of
 from pop_core.fitting.observation import keypoint_rays
@@ -29,6 +28,7 @@ from pop_core.fitting.residuals import (
 )
 from pop_core.fitting.robust_loss import Power
 from pop_core.fitting.self_collision import collision_residual
+from pop_core.keypoints.joint_belief import JointBelief
 from pop_core.keypoints.lifted_joints import LiftedJoints
 from pop_core.retrieval.pose_prior import load_pose_prior
 

@@ -54,6 +54,14 @@ def test_a_network_gives_its_outputs(tmp_path):
     assert str(session.spec) == 'image (1, 3, 4, 4) float32 -> out (1, 3, 4, 4) float32'
 
 
+def test_as_many_inputs_as_a_network_has_are_asked_for(tmp_path):
+    double = helper.make_node('Add', ['image', 'image'], ['out'])
+    session = load_network(save_graph(tmp_path / 'n.onnx', [double], [info('out')], SMALL))
+    image = np.zeros(SMALL, np.float32)
+    with pytest.raises(NetworkShapeError, match='expected 1 inputs, found 2'):
+        session.run(image, image)
+
+
 @pytest.mark.parametrize(('there', 'chosen'), [
     (['CPUExecutionProvider'], ['CPUExecutionProvider']),
     (['TensorrtExecutionProvider', 'CUDAExecutionProvider', 'CPUExecutionProvider'],

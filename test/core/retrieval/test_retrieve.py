@@ -5,10 +5,10 @@ from pop_core.body.default_body import default_body
 from pop_core.body.joints import SHARED_INDEX
 from pop_core.body.kinematics import attached_positions
 from pop_core.body.model import BodyParameters, shared_points
-from pop_core.completion.joint_belief import JointBelief
 from pop_core.errors import LibraryFileError
 from pop_core.geometry.camera import Camera
 from pop_core.geometry.rotation import from_rotvec, to_rotvec
+from pop_core.keypoints.joint_belief import JointBelief
 from pop_core.keypoints.lifted_joints import LiftedJoints, LiftState
 from pop_core.retrieval.default_library import generate_library
 from pop_core.retrieval.outliers import reject_strangers
@@ -220,9 +220,11 @@ def test_same_visibility_keeps_to_poses_recorded_alike(library):
     recorded = PoseLibrary(
         library.body_pose, library.tilt, library.columns, masks, library.weights)
     config = RetrievalConfig(same_visibility=True)
-    found = retrieve(recorded, seen_from(placed(library, 8), ARM), config)
-    assert len(found) == 6
-    assert all(candidate.index in alike for candidate in found)
+    joints = placed(library, 8)
+    for expected in (None, JointBelief(joints, np.full(15, 0.05))):
+        found = retrieve(recorded, seen_from(joints, ARM), config, expected=expected)
+        assert len(found) == 6
+        assert all(candidate.index in alike for candidate in found)
 
 
 def test_chosen_poses_stand_for_the_camps_of_belief():

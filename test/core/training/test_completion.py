@@ -21,9 +21,16 @@ from pop_core.training.completion.network import (  # noqa: E402
 )
 from pop_core.training.completion.trainer import (  # noqa: E402
     CompletionTrainer,
-    ViewPool,
-    figures,
     train,
+)
+from pop_core.training.completion.validation import (  # noqa: E402
+    error_table,
+    errors,
+    figures,
+)
+from pop_core.training.completion.view_pool import (  # noqa: E402
+    ViewPool,
+    load_pool,
     varied,
 )
 from pop_core.training.trainer import CheckpointError  # noqa: E402
@@ -66,7 +73,14 @@ def test_variants_show_the_same_people(pool):
     assert same.all(dim=0).sum() < len(rows)  # nobody is symmetrical
     assert bool(same[0].any())
     assert bool(same[1].any())
-    assert bool((other.keypoints[..., 3] <= other.keypoints[..., 3].round()).all())
+    flags = torch.where(same[0][:, None], views.keypoints[..., 3], views.keypoints[:, mirrored, 3])
+    assert bool((other.keypoints[..., 3] <= flags).all())
+    assert bool((other.keypoints[..., 3] < flags).any())  # some were taken away
+    kept = other.keypoints[..., 3] > 0
+    across, kept_side = views.keypoints[..., 0], same[0][:, None]
+    across = torch.where(kept_side, across, -across[:, mirrored])
+    assert torch.equal(other.keypoints[..., 0][kept], across[kept])
+    assert not bool(other.keypoints[~kept].any())
 
 
 def test_it_learns_goes_on_and_is_the_same_as_onnx(pool, tmp_path):
@@ -92,10 +106,20 @@ def test_a_run_writes_its_checkpoint(drawn, tmp_path):
     trainer = CompletionTrainer()
     train(trainer, tmp_path, tmp_path, tmp_path / 'net.pt', 0.02, said.append)
     assert trainer.views > 0
-    assert 'mm mean' in said[-1]
+    assert said[-1] == figures(trainer.averaged, load_pool(tmp_path))
     other = CompletionTrainer()
     other.load(tmp_path / 'net.pt')
     assert other.views == trainer.views
+
+
+def test_people_are_counted_by_what_is_seen_of_them(pool):
+    network = CompletionTrainer().averaged
+    rows = [line.split() for line in error_table(network, pool)]
+    assert sum(int(row[3]) for row in rows[1:]) == len(pool)
+    seen = (pool.state == 0).sum(dim=1) >= 11
+    off_mm = 1e3 * errors(network, pool)[seen][pool.state[seen] == 0]
+    assert rows[-1][:3] == ['11', 'to', '15']
+    assert rows[-1][4] == f'{off_mm.mean():.0f}/{off_mm.median():.0f}'
 
 
 def test_a_damaged_checkpoint_is_named(tmp_path):
