@@ -5,6 +5,7 @@ import pytest
 from keypoint_bodies import SEATED, bent, show, with_depth
 
 from pop_core.body.joints import SHARED_INDEX
+from pop_core.keypoints.joint_belief import JointBelief
 from pop_core.keypoints.lifted_joints import LiftState
 from pop_core.keypoints.lifting import LiftingConfig, lift_keypoints
 from pop_core.keypoints.people import detection_of
@@ -108,6 +109,34 @@ def test_a_keypoint_thrown_across_the_body_is_an_outlier():
     assert lifted.state[wrist] == LiftState.OUTLIER
     others = np.setdiff1d(np.arange(15), [wrist])
     assert (lifted.state[others] == LiftState.VISIBLE).all()
+
+
+def test_of_two_surfaces_the_one_near_what_is_expected_is_taken():
+    body = show()
+    wrist, elbow = SHARED_INDEX['left_wrist'], SHARED_INDEX['left_elbow']
+    u, v = np.rint(body.detection.keypoints_px[wrist]).astype(int)
+    depth = body.frame.depth_m.copy()
+    farther_m = depth[v, u] + 0.16  # where a forearm that leans back would end
+    depth[v - 14: v + 15, u: u + 15] = farther_m
+    body = with_depth(body, depth)
+    for off_m in (0.0, 0.16):
+        places = body.truth.copy()
+        places[wrist, 2] += off_m
+        expected = JointBelief(places, np.full(15, 0.05))
+        lifted = lift_keypoints(body.frame, body.detection, expected=expected)
+        assert lifted.lifted[[wrist, elbow]].all()
+        assert lifted.positions_camera[wrist, 2] == pytest.approx(places[wrist, 2], abs=0.05)
+
+
+def test_one_joint_that_is_expected_where_no_bone_reaches_stays():
+    body = show()
+    places = body.truth.copy()
+    places[SHARED_INDEX['left_wrist'], 2] += 0.8
+    expected = JointBelief(places, np.full(15, 0.03))
+    alone = lift_keypoints(body.frame, body.detection)
+    told = lift_keypoints(body.frame, body.detection, expected=expected)
+    assert np.array_equal(told.lifted, alone.lifted)
+    assert np.allclose(told.positions_camera, alone.positions_camera, equal_nan=True)
 
 
 def test_arms_held_before_the_chest_stay_visible():

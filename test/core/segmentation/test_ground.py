@@ -7,7 +7,7 @@ from support.mounted import mounted, turned_points
 from pop_core.geometry.camera import Camera
 from pop_core.geometry.rotation import from_rotvec
 from pop_core.rgbd import RgbdFrame
-from pop_core.segmentation.ground import Ground, find_ground
+from pop_core.segmentation.ground import Ground, find_ground, ground_of
 from pop_core.segmentation.plane_kernels import plane_shares
 
 CAMERA = Camera(320, 240, 262.0, 262.0, 159.5, 119.5)
@@ -75,6 +75,16 @@ def test_a_wall_alone_has_no_floor() -> None:
 
 def test_nothing_measured_has_no_floor() -> None:
     assert find_ground(frame(np.full((240, 320), np.nan, dtype=np.float32))) is None
+
+
+def test_who_is_surely_below_a_plane_does_not_stand_on_it() -> None:
+    seat = Ground(np.array([0.0, -1.0, 0.0]), 0.8)
+    joints = np.array([[0.0, 0.2, 2.0], [0.0, 1.1, 2.0]])  # 60 cm above it, 30 below
+    sure, unsure = np.array([0.03, 0.1]), np.array([0.03, 0.4])
+    assert ground_of(seat, joints, sure) is None
+    assert ground_of(seat, joints, unsure) is seat
+    assert ground_of(seat, joints[:1], sure[:1]) is seat
+    assert ground_of(None, joints, sure) is None
 
 
 def test_floor_pixels_are_those_of_the_floor() -> None:
