@@ -42,7 +42,8 @@ from pop_core.stopwatch import Stopwatch
 
 SMALLEST_EXTENT_M = 0.15  # joints nearer together than this are no skeleton
 DOUBTFUL_SCORE = 0.65  # a body that explains so little may be somebody seen from the other side
-CLEARLY_BETTER = 0.1  # by how much the score must rise for it
+CLEARLY_LESS = 0.9  # of the cost as named, so that it is taken for that
+SURER = 0.1  # by which the mean logarithm of sigmas is less, so that it is tried
 MARGIN = 2.0  # around a body, of how far its segment may grow: a limb may be nearer than the rest
 SAME_PLACE_M = 0.3  # a person behind another is often lifted onto the one in front
 
@@ -68,6 +69,21 @@ class Scene:
     ) -> Scene:
         """Return the scene with the floor only if somebody's joints are not below it."""
         return replace(self, ground=ground_of(self.ground, p_camera, sigma_m))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reading:
+    """What one person's keypoints are taken for.
+
+    Args:
+        detection: The keypoints as they are named.
+        lifted: Joints lifted from them.
+        expected: Where all joints are expected, or None where nothing is or depth contradicts it.
+    """
+
+    detection: Detection
+    lifted: LiftedJoints
+    expected: JointBelief | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -189,44 +205,65 @@ class BodyPipeline:
         lifted: LiftedJoints,
         watch: Stopwatch,
     ) -> PersonFit:
-        """Fit one person; where that explains little, with left and right exchanged, too.
+        """Fit one person; where that is in doubt, with left and right exchanged, too.
 
         A detector that takes a back for a front names every joint after the other side, and
-        retrieval believes it.
+        retrieval believes it. Depth tells: where it is surer of the joints once they are
+        exchanged, or where the body explains little, the cheaper of both is taken.
         """
-        person = self._fit_as_named(scene, detection, lifted, watch)
-        score = 1.0 if person.estimate is None else person.estimate.score
-        if score > DOUBTFUL_SCORE or not self.config.fitting.other_readings:
-            return person
         other = detection.with_sides_exchanged()
-        lifted = self.lift(scene.frame, other)
-        if self.admit(lifted) is not EstimateStatus.OK:
+        with watch.step('complete'):
+            named, exchanged = self._expected(scene, detection), self._expected(scene, other)
+            reading = self._read(scene, detection, named, lifted)
+        person = self._fit_as_read(scene, reading, watch)
+        explains_little = person.estimate is not None and person.estimate.score <= DOUBTFUL_SCORE
+        if not (explains_little or is_surer(exchanged, named)):
             return person
-        again = self._fit_as_named(scene, other, lifted, watch)
-        if again.estimate is None or again.estimate.score < score + CLEARLY_BETTER:
+        if not self.config.fitting.other_readings:
             return person
+        with watch.step('complete'):
+            turned = self._read(scene, other, exchanged)
+        if turned.expected is None and reading.expected is not None:
+            return person  # depth contradicts it
+        again = self._fit_as_read(scene, turned, watch)
         return again if self._costs_less(again, person) else person
 
     def _costs_less(self, person: PersonFit, other: PersonFit) -> bool:
-        """Return whether a fit explains a person at less cost than another, each as it read it."""
+        """Return whether a fit explains a person at clearly less cost, each as it read it."""
         if person.fit is None or person.observation is None:
             return False
         if other.fit is None or other.observation is None:
             return True
         ours, theirs = self.fitter.costs(
             [person.fit, other.fit], [person.observation, other.observation])
-        return ours < theirs
+        return ours < CLEARLY_LESS * theirs
 
-    def _fit_as_named(
-        self,
-        scene: Scene,
-        detection: Detection,
-        lifted: LiftedJoints,
-        watch: Stopwatch,
-    ) -> PersonFit:
-        """Lift anew by what is expected, then retrieve, fit and segment one person."""
-        with watch.step('complete'):
-            lifted, expected = self._lifted_again(scene, detection, lifted)
+    def _expected(self, scene: Scene, detection: Detection) -> JointBelief | None:
+        if self.completion is None or not self.config.use_completion:
+            return None
+        return self.completion.expected(scene.frame, detection, scene.taken)
+
+    def _read(
+        self, scene: Scene, detection: Detection, expected: JointBelief | None,
+        lifted: LiftedJoints | None = None,
+    ) -> Reading:
+        """Lift joints from what nearer people left, by where they are expected.
+
+        Whatever is expected that contradicts nearly all that was measured is of somebody else.
+        """
+        covered = covers_keypoints(scene.taken, detection)
+        frame = without_depth(scene.frame, scene.taken) if covered else scene.frame
+        if expected is not None:
+            near = reject_strangers(self.lift(frame, detection, expected), expected)
+            if self.admit(near) is EstimateStatus.OK:
+                return Reading(detection, near, expected)
+        if lifted is None or covered:
+            lifted = self.lift(frame, detection)
+        return Reading(detection, lifted, None)
+
+    def _fit_as_read(self, scene: Scene, reading: Reading, watch: Stopwatch) -> PersonFit:
+        """Retrieve, fit and segment one person."""
+        lifted, expected = reading.lifted, reading.expected
         status = self.admit(lifted)
         if status is not EstimateStatus.OK:
             return PersonFit(status)
@@ -236,7 +273,7 @@ class BodyPipeline:
             scene = scene.with_ground_of(expected.positions_camera, expected.sigma_m)
         with watch.step('observe'):
             observation = observe(
-                scene.frame, lifted, scene.taken, scene.ground, detection.part_labels,
+                scene.frame, lifted, scene.taken, scene.ground, reading.detection.part_labels,
                 scene.noise, expected=expected)
         with watch.step('retrieve'):
             candidates = self._retrieve(lifted, observation, scene.frame.camera, gravity)
@@ -256,22 +293,6 @@ class BodyPipeline:
         """Return the joints of a detection in 3D, without those that no pose explains."""
         lifted = lift_keypoints(frame, detection, self.config.lifting, expected)
         return reject_outliers(self.library, lifted, self.config.retrieval)
-
-    def _lifted_again(
-        self, scene: Scene, detection: Detection, lifted: LiftedJoints
-    ) -> tuple[LiftedJoints, JointBelief | None]:
-        """Return joints, lifted from what nearer people left, and where all are expected.
-
-        Whatever is expected that contradicts nearly all that was measured is of somebody else.
-        """
-        covered = covers_keypoints(scene.taken, detection)
-        frame = without_depth(scene.frame, scene.taken) if covered else scene.frame
-        if self.completion is not None and self.config.use_completion:
-            expected = self.completion.expected(scene.frame, detection, scene.taken)
-            near = reject_strangers(self.lift(frame, detection, expected), expected)
-            if self.admit(near) is EstimateStatus.OK:
-                return near, expected
-        return (self.lift(frame, detection) if covered else lifted), None
 
     def _retrieve(
         self, lifted: LiftedJoints, observation: Observation, camera: Camera,
@@ -339,6 +360,12 @@ class BodyPipeline:
         if not is_inside(lifted, self.config.region):
             return EstimateStatus.OUTSIDE
         return EstimateStatus.OK
+
+
+def is_surer(exchanged: JointBelief | None, named: JointBelief | None) -> bool:
+    """Return whether more is known of a person's joints with left and right exchanged."""
+    return (exchanged is not None and named is not None
+            and exchanged.vagueness < named.vagueness - SURER)
 
 
 def covers_keypoints(taken: Bool[np.ndarray, 'h w'], detection: Detection) -> bool:

@@ -22,6 +22,11 @@ class JointBelief:
     positions_camera: Float[np.ndarray, 's 3']
     sigma_m: Float[np.ndarray, 's']
 
+    @property
+    def vagueness(self) -> float:
+        """Return the mean logarithm of the standard deviations."""
+        return float(np.log(self.sigma_m).mean())
+
     def with_sides_exchanged(self) -> JointBelief:
         """Return the belief with every left joint called right, and vice versa."""
         return JointBelief(self.positions_camera[SHARED_MIRROR], self.sigma_m[SHARED_MIRROR])

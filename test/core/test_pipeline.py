@@ -236,7 +236,7 @@ class Told(JointCompletion):
 
 def test_hidden_joints_are_asked_for_unless_that_is_off(scene: SyntheticScene) -> None:
     detections = [d for d in scene.detections() if d is not None]
-    for use, asked in ((True, 2), (False, 0)):
+    for use, asked in ((True, 4), (False, 0)):  # of two people, and with their sides exchanged
         told = Told(0.0)
         pipeline = BodyPipeline(
             default_body(), default_library(), Given(detections),
@@ -256,3 +256,21 @@ def test_a_network_that_is_sure_and_wrong_leaves_people_where_they_are(
     assert len(found.bodies) == len(result.bodies)
     for body, usual in zip(found.bodies, result.bodies, strict=True):
         assert np.linalg.norm(body.joints[0] - usual.joints[0]) < 0.1
+
+
+def test_sides_are_exchanged_only_where_depth_is_surer_of_it(
+    scene: SyntheticScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    named = [d for d in scene.detections() if d is not None]
+    fitted, fit = [], BodyFitter.fit
+
+    def watched(self: BodyFitter, *arguments: Any) -> BodyFit:
+        fitted.append(fit(self, *arguments))
+        return fitted[-1]
+
+    monkeypatch.setattr(BodyFitter, 'fit', watched)
+    run(scene.frame, named)
+    assert len(fitted) == len(named)
+    fitted.clear()
+    run(scene.frame, [d.with_sides_exchanged() for d in named])
+    assert len(fitted) == 2 * len(named)

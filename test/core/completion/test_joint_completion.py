@@ -53,6 +53,18 @@ def test_it_knows_how_far_off_it_may_be(told):
     assert 0.7 < np.median(off_m / sigma_m) < 2.0
 
 
+def test_it_is_surer_where_left_and_right_are_named_rightly(completion):
+    surer = []
+    for seed in SEEDS:
+        scene = synthesise_scene(default_body(), seed, SceneConfig(colour=False))
+        for detection in scene.detections():
+            named, exchanged = (
+                completion.expected(scene.frame, way).vagueness
+                for way in (detection, detection.with_sides_exchanged()))
+            surer.append(named < exchanged)
+    assert np.mean(surer) > 0.9
+
+
 def test_a_mirrored_person_has_mirrored_joints(completion):
     scene = synthesise_scene(default_body(), SEEDS[0], SceneConfig(colour=False))
     detection, camera = scene.detections()[0], scene.frame.camera
