@@ -78,7 +78,8 @@ class Reading:
     Args:
         detection: The keypoints as they are named.
         lifted: Joints lifted from them.
-        expected: Where all joints are expected, or None where nothing is or depth contradicts it.
+        expected: Where all joints are expected, or None where nothing is, or most that was
+            lifted contradicts it.
     """
 
     detection: Detection
@@ -140,7 +141,8 @@ class BodyPipeline:
         """Return the bodies of a frame, nearest first (steps 1 to 8 of the paper).
 
         Raises:
-            PopError: If the keypoint source cannot read what it needs for this frame.
+            PopError: If the keypoint source cannot read what it needs for this frame, or a network
+                fails.
         """
         watch = Stopwatch()
         with watch.step('detect'):
@@ -211,21 +213,30 @@ class BodyPipeline:
         retrieval believes it. Depth tells: where it is surer of the joints once they are
         exchanged, or where the body explains little, the cheaper of both is taken.
         """
-        other = detection.with_sides_exchanged()
         with watch.step('complete'):
-            named, exchanged = self._expected(scene, detection), self._expected(scene, other)
+            named = self._expected(scene, detection)
+        with watch.step('lift'):
             reading = self._read(scene, detection, named, lifted)
-        person = self._fit_as_read(scene, reading, watch)
+        # What is no floor of theirs is level all the same.
+        gravity = None if scene.ground is None else -scene.ground.normal
+        if reading.expected is not None:
+            scene = scene.with_ground_of(
+                reading.expected.positions_camera, reading.expected.sigma_m)
+        person = self._fit_as_read(scene, reading, gravity, watch)
+        if not self.config.fitting.other_readings:
+            return person
+        other, exchanged = detection.with_sides_exchanged(), None
+        if named is not None:
+            with watch.step('complete'):
+                exchanged = self._expected(scene, other)
         explains_little = person.estimate is not None and person.estimate.score <= DOUBTFUL_SCORE
         if not (explains_little or is_surer(exchanged, named)):
             return person
-        if not self.config.fitting.other_readings:
-            return person
-        with watch.step('complete'):
+        with watch.step('lift'):
             turned = self._read(scene, other, exchanged)
-        if turned.expected is None and reading.expected is not None:
-            return person  # depth contradicts it
-        again = self._fit_as_read(scene, turned, watch)
+        if turned.lifted.lifted.sum() < reading.lifted.lifted.sum():
+            return person  # depth contradicts it, and there is less to compare it by
+        again = self._fit_as_read(scene, turned, gravity, watch)
         return again if self._costs_less(again, person) else person
 
     def _costs_less(self, person: PersonFit, other: PersonFit) -> bool:
@@ -249,28 +260,30 @@ class BodyPipeline:
     ) -> Reading:
         """Lift joints from what nearer people left, by where they are expected.
 
-        Whatever is expected that contradicts nearly all that was measured is of somebody else.
+        Expected joints that most of those that were lifted contradict are somebody else's.
         """
         covered = covers_keypoints(scene.taken, detection)
         frame = without_depth(scene.frame, scene.taken) if covered else scene.frame
         if expected is not None:
-            near = reject_strangers(self.lift(frame, detection, expected), expected)
-            if self.admit(near) is EstimateStatus.OK:
-                return Reading(detection, near, expected)
+            found = self.lift(frame, detection, expected)
+            near = reject_strangers(found, expected)
+            agree = 2 * near.lifted.sum() > found.lifted.sum()
+            for joints in (near, found):
+                if agree and self.admit(joints) is EstimateStatus.OK:
+                    return Reading(detection, joints, expected)
         if lifted is None or covered:
             lifted = self.lift(frame, detection)
         return Reading(detection, lifted, None)
 
-    def _fit_as_read(self, scene: Scene, reading: Reading, watch: Stopwatch) -> PersonFit:
+    def _fit_as_read(
+        self, scene: Scene, reading: Reading, gravity: Float[np.ndarray, '3'] | None,
+        watch: Stopwatch,
+    ) -> PersonFit:
         """Retrieve, fit and segment one person."""
         lifted, expected = reading.lifted, reading.expected
         status = self.admit(lifted)
         if status is not EstimateStatus.OK:
             return PersonFit(status)
-        # What is no floor of theirs is level all the same.
-        gravity = None if scene.ground is None else -scene.ground.normal
-        if expected is not None:
-            scene = scene.with_ground_of(expected.positions_camera, expected.sigma_m)
         with watch.step('observe'):
             observation = observe(
                 scene.frame, lifted, scene.taken, scene.ground, reading.detection.part_labels,

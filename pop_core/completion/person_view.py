@@ -70,13 +70,12 @@ def view_person(
         taken: Pixels of others, who do not tell how far this person is; None for nobody's.
     """
     scores = detection.scores
-    found = np.isfinite(detection.keypoints_px).all(axis=1) & (scores > 0)
+    found = (scores > 0) & _inside(detection.keypoints_px, camera)
     if not found.any():
         return None
     focal, centre = np.array([camera.fx, camera.fy]), np.array([camera.cx, camera.cy])
     rays = (np.where(found[:, None], detection.keypoints_px, centre) - centre) / focal
-    own_m = depth_m if taken is None else np.where(taken, np.float32(np.nan), depth_m)
-    person_m = _person_depth(own_m, detection.keypoints_px, scores, found)
+    person_m = _person_depth(depth_m, detection.keypoints_px, scores, found, taken)
     if person_m is None:
         return None
     middle = (rays[found].min(axis=0) + rays[found].max(axis=0)) / 2
@@ -89,15 +88,24 @@ def view_person(
     return PersonView(relief_m, measured, keypoints.astype(np.float32), middle, person_m)
 
 
+def _inside(
+    keypoints_px: Float[np.ndarray, 's 2'], camera: Camera
+) -> Bool[np.ndarray, 's']:
+    """Return which keypoints there are in the image."""
+    with np.errstate(invalid='ignore'):
+        pixel = np.rint(keypoints_px)
+        return np.asarray(((pixel >= 0) & (pixel < [camera.width, camera.height])).all(axis=1))
+
+
 def _person_depth(
     depth_m: Float32[np.ndarray, 'h w'], keypoints_px: Float[np.ndarray, 's 2'],
     scores: Float[np.ndarray, 's'], found: Bool[np.ndarray, 's'],
+    taken: Bool[np.ndarray, 'h w'] | None,
 ) -> float | None:
     """Return the median depth at keypoints [m], at those that are sure where there are any."""
-    height, width = depth_m.shape
-    u, v = np.rint(np.where(found[:, None], keypoints_px, -1.0)).astype(np.int64).T
-    inside = (u >= 0) & (u < width) & (v >= 0) & (v < height)
-    for chosen in (inside & (scores >= SURE_SCORE), inside):
+    u, v = np.rint(np.where(found[:, None], keypoints_px, 0.0)).astype(np.int64).T
+    own = found if taken is None else found & ~taken[v, u]
+    for chosen in (own & (scores >= SURE_SCORE), own):
         read = depth_m[v[chosen], u[chosen]]
         read = read[np.isfinite(read)]
         if len(read):

@@ -21,7 +21,7 @@ ALIKE_COS = 0.85
 NARROWINGS = (1.0, 0.6, 0.4)  # of the inlier band, refinement by refinement
 MIN_SHARE = 0.02  # of all measured points
 MAX_BELOW = 0.005  # share of points that may lie below a floor: mirrors, noise
-SURELY_BELOW = 1.5  # standard deviations; joints of people on their floor stay above a third
+SURELY_BELOW = 1.5  # standard deviations; of people on their floor none is below by a whole one
 BELOW_WIDTHS = 3.0  # surely below: this many widths of the plane
 LOOSE_BELOW = 0.02  # the same for a proposal, whose normal is one noisy pixel's
 

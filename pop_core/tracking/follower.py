@@ -47,7 +47,7 @@ MIN_SEEN = 0.04  # share of the body that must be seen for the frame to say anyt
 CONTRADICTED = 0.4  # a body is not where the camera saw through this share of it
 USUAL_SHARE = 0.05  # how fast the usual E_depth follows
 TRUSTED_SUPPORT = 0.5
-JOINT_SIGMA_M = 0.1  # of joints that are below what seems to be the floor
+FOLLOWED_SIGMA_M = 0.1  # of joints where they were last: a floor holds them up
 HIDDEN_TURN_RAD = 0.5  # people hidden for a while come out much as they went in
 
 
@@ -66,7 +66,8 @@ class Follower:
         """Move a track's beliefs to the time of a frame."""
         track.gap_s = (now_ns - track.now_ns) * 1e-9
         track.now_ns = now_ns
-        joints = self._body(track.filter).joints
+        body = self._body(track.filter)
+        track.landmarks, joints = body.landmarks, body.joints
         track.trail = followed_trail(
             joints if track.trail is None else track.trail, joints, track.gap_s)
         track.left_m = float(np.linalg.norm(joints - track.trail, axis=1).max())
@@ -98,7 +99,8 @@ class Follower:
         if lifted is not None:
             track.misnamed = misnamed_joints(body.landmarks, lifted)
             lifted = lifted.with_sides_exchanged(track.misnamed)
-        scene = scene.with_ground_of(body.landmarks, np.full(N_SHARED, JOINT_SIGMA_M))
+        assert track.landmarks is not None
+        scene = scene.with_ground_of(track.landmarks, np.full(N_SHARED, FOLLOWED_SIGMA_M))
         observation = observe_track(
             scene.frame, scene.ground, scene.taken, body, track.joint_state, lifted,
             noise=scene.noise)

@@ -68,6 +68,7 @@ class PersonTrack:
         rivals_beaten: Bodies found anew, one after the other, that were no better.
         restarted_ns: When the body was last looked for anew.
         evidence: Shared joints that were surely seen when it was.
+        landmarks: Where the shared joints were in the last frame, None before the second [m].
         trail: Where the joints were of late, None before the second frame [m].
         left_m: How far any joint has left it.
         blur_m: Noise of the depth image where the person is.
@@ -100,6 +101,7 @@ class PersonTrack:
     rivals_beaten: int = 0
     restarted_ns: int = 0
     evidence: Bool[np.ndarray, '15'] = field(default_factory=_no_joints)
+    landmarks: Float[np.ndarray, '15 3'] | None = None
     trail: Float[np.ndarray, '24 3'] | None = None
     left_m: float = 0.0
     blur_m: float = 0.0

@@ -1,6 +1,5 @@
 """From keypoints and depth to bodies, on a synthetic scene and at its edges."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,12 @@ from pop_core.config import PipelineConfig
 from pop_core.depth_noise import USUAL_NOISE
 from pop_core.estimate import EstimateStatus, FrameResult, JointState
 from pop_core.fitting.body_fit import BodyFit, BodyFitter
+from pop_core.fitting.fitting_config import FittingConfig
+from pop_core.fitting.observation import Observation
 from pop_core.keypoints.detection import Detection
 from pop_core.keypoints.joint_belief import JointBelief
 from pop_core.keypoints.region import RegionConfig
-from pop_core.pipeline import BodyPipeline, PersonFit, Scene
+from pop_core.pipeline import BodyPipeline, PersonFit, Reading, Scene
 from pop_core.retrieval.default_library import default_library
 from pop_core.rgbd import RgbdFrame
 from pop_core.segmentation.ground import Ground, find_ground
@@ -201,21 +202,16 @@ def test_people_outside_the_region_of_interest_are_left_alone(
 def test_what_hides_the_legs_is_nobodys_floor(
     scene: SyntheticScene, result: FrameResult, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A plane half a metre above the true one: in single frames, and while people are followed."""
     floor = find_ground(scene.frame)
     assert floor is not None
     seat = Ground(floor.normal, floor.offset_m - 0.5)
-    for module in ('pop_core.pipeline', 'pop_core.tracking.looks'):
-        monkeypatch.setattr(f'{module}.find_ground', lambda _: seat)
+    monkeypatch.setattr('pop_core.pipeline.find_ground', lambda _: seat)
     detections = [d for d in scene.detections() if d is not None]
     pipeline = BodyPipeline(default_body(), default_library(), Given(detections))
-    tracker, later = BodyTracker(pipeline), replace(scene.frame, stamp_ns=10**8)
-    for found in (
-        pipeline.process(scene.frame), tracker.process(scene.frame), tracker.process(later)
-    ):
-        assert len(found.bodies) == len(result.bodies)
-        for body, usual in zip(found.bodies, result.bodies, strict=True):
-            assert np.linalg.norm(body.joints - usual.joints, axis=1).mean() < 0.05
+    found = pipeline.process(scene.frame)
+    assert len(found.bodies) == len(result.bodies)
+    for body, usual in zip(found.bodies, result.bodies, strict=True):
+        assert np.linalg.norm(body.joints - usual.joints, axis=1).mean() < 0.05
 
 
 class Told(JointCompletion):
@@ -245,32 +241,76 @@ def test_hidden_joints_are_asked_for_unless_that_is_off(scene: SyntheticScene) -
         assert told.asked == asked
 
 
-@pytest.mark.parametrize('off_m', [0.2, 3.0])
-def test_a_network_that_is_sure_and_wrong_leaves_people_where_they_are(
-    scene: SyntheticScene, result: FrameResult, off_m: float
+@pytest.mark.parametrize(('off_m', 'sigma_m', 'used'), [
+    (0.2, 0.01, False), (3.0, 0.01, False), (0.1, 0.06, True)])
+def test_a_network_that_is_wrong_leaves_people_where_they_are(
+    scene: SyntheticScene, result: FrameResult, monkeypatch: pytest.MonkeyPatch,
+    off_m: float, sigma_m: float, used: bool,
 ) -> None:
+    told, fit = [], BodyFitter.fit
+
+    def watched(self: BodyFitter, seen: Observation, *arguments: Any) -> BodyFit:
+        told.append(seen.expected is not None)
+        return fit(self, seen, *arguments)
+
+    monkeypatch.setattr(BodyFitter, 'fit', watched)
     detections = [d for d in scene.detections() if d is not None]
     pipeline = BodyPipeline(
-        default_body(), default_library(), Given(detections), completion=Told(off_m, 0.01))
+        default_body(), default_library(), Given(detections), completion=Told(off_m, sigma_m))
     found = pipeline.process(scene.frame)
+    assert told
+    assert all(each == used for each in told)
     assert len(found.bodies) == len(result.bodies)
     for body, usual in zip(found.bodies, result.bodies, strict=True):
         assert np.linalg.norm(body.joints[0] - usual.joints[0]) < 0.1
 
 
-def test_sides_are_exchanged_only_where_depth_is_surer_of_it(
+def test_sides_are_exchanged_where_depth_is_surer_and_the_fit_costs_clearly_less(
     scene: SyntheticScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """The fit's own attempts to turn about set aside: they would undo most of it."""
     named = [d for d in scene.detections() if d is not None]
-    fitted, fit = [], BodyFitter.fit
+    wrong = [d.with_sides_exchanged() for d in named]
+    read, fit_as_read = [], BodyPipeline._fit_as_read
 
-    def watched(self: BodyFitter, *arguments: Any) -> BodyFit:
-        fitted.append(fit(self, *arguments))
-        return fitted[-1]
+    def watched(self: BodyPipeline, seen: Scene, reading: Reading, *arguments: Any) -> PersonFit:
+        read.append(reading)
+        return fit_as_read(self, seen, reading, *arguments)
 
-    monkeypatch.setattr(BodyFitter, 'fit', watched)
+    monkeypatch.setattr(BodyPipeline, '_fit_as_read', watched)
     run(scene.frame, named)
-    assert len(fitted) == len(named)
-    fitted.clear()
-    run(scene.frame, [d.with_sides_exchanged() for d in named])
-    assert len(fitted) == 2 * len(named)
+    assert len(read) == len(named)
+    for cost, exchanged in ((0.89, True), (0.91, False)):
+        read.clear()
+        monkeypatch.setattr(BodyFitter, 'costs', lambda *_, cost=cost: [cost, 1.0])
+        pipeline = BodyPipeline(default_body(), default_library(), Given(wrong))
+        people = watched_people(pipeline, scene.frame)
+        assert len(read) == 2 * len(wrong)
+        for person, readings in zip(people, (read[:2], read[2:]), strict=True):
+            assert person.observation is not None
+            np.testing.assert_array_equal(
+                person.observation.lifted.positions_camera,
+                readings[exchanged].lifted.without_guesses().positions_camera)
+
+
+def test_without_other_readings_nobody_is_read_twice(scene: SyntheticScene) -> None:
+    wrong = [d.with_sides_exchanged() for d in scene.detections() if d is not None]
+    told = Told(0.0)
+    config = PipelineConfig(fitting=FittingConfig(other_readings=False))
+    pipeline = BodyPipeline(
+        default_body(), default_library(), Given(wrong), config, completion=told)
+    pipeline.process(scene.frame)
+    assert told.asked == len(wrong)
+
+
+def watched_people(pipeline: BodyPipeline, frame: RgbdFrame) -> list[PersonFit]:
+    """Return what became of every person of a frame, nearest first."""
+    people, fit_person = [], pipeline.fit_person
+
+    def watched(*arguments: Any) -> PersonFit:
+        people.append(fit_person(*arguments))
+        return people[-1]
+
+    pipeline.fit_person = watched  # type: ignore[method-assign]
+    pipeline.process(frame)
+    return people

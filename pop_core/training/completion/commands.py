@@ -1,4 +1,4 @@
-"""`python -m pop_core.training completion COMMAND`: views, train, export."""
+"""`python -m pop_core.training completion COMMAND`: views, train, validate, export."""
 
 from __future__ import annotations
 

@@ -119,6 +119,14 @@ def test_who_stands_in_front_does_not_say_how_far_the_person_is():
     assert view.relief_m.min() == np.float32(-RELIEF_M)  # and yet is seen
 
 
+def test_keypoints_beyond_the_image_move_no_window():
+    here, stray = {0: (180, 100), 5: (200, 140), 7: (150, 90)}, {9: (2000, 100)}
+    alone, both = (
+        view_person(wall(2.5), CAMERA, somebody(points)) for points in (here, here | stray))
+    assert np.array_equal(alone.keypoints, both.keypoints)
+    assert np.array_equal(alone.middle, both.middle)
+
+
 def test_keypoints_beyond_the_image_are_nowhere_near_its_border():
     depth_m = wall(3.0)
     depth_m[:, -1] = 9.0

@@ -11,6 +11,7 @@ from pop_core.body.kinematics import joints
 from pop_core.body.model import BodyModel, BodyParameters
 from pop_core.errors import RepeatedStampError
 from pop_core.estimate import TrackState
+from pop_core.segmentation.ground import Ground
 from pop_core.tracking.tracking_config import TrackingConfig
 
 
@@ -33,6 +34,17 @@ def test_a_walker_keeps_the_id_and_is_followed(
     assert found.track.unseen_s == 0.0
     off = np.linalg.norm(found.joints - joints(body, here), axis=1)
     assert off.mean() < 0.03  # the coarse mesh and the few steps of a tracked frame
+
+
+def test_a_plane_above_the_feet_of_who_is_followed_is_not_their_floor(
+    stage: Stage, body: BodyModel, person: BodyParameters, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    feet_m = joints(body, person)[:, 1].max()
+    seat = Ground(np.array([0.0, -1.0, 0.0]), feet_m - 0.45)
+    monkeypatch.setattr('pop_core.tracking.looks.find_ground', lambda _: seat)
+    found = only(stage.show(person, times=12))
+    off = np.linalg.norm(found.joints - joints(body, person), axis=1)
+    assert off.max() < 0.06
 
 
 def test_the_detector_is_asked_every_few_frames_only(
