@@ -223,21 +223,30 @@ class BodyPipeline:
             scene = scene.with_ground_of(
                 reading.expected.positions_camera, reading.expected.sigma_m)
         person = self._fit_as_read(scene, reading, gravity, watch)
-        if not self.config.fitting.other_readings:
+        turned = self._turned(scene, reading, named, person, watch)
+        if turned is None:
             return person
-        other, exchanged = detection.with_sides_exchanged(), None
+        again = self._fit_as_read(scene, turned, gravity, watch)
+        return again if self._costs_less(again, person) else person
+
+    def _turned(
+        self, scene: Scene, reading: Reading, named: JointBelief | None, person: PersonFit,
+        watch: Stopwatch,
+    ) -> Reading | None:
+        """Return the reading with left and right exchanged, None where nothing speaks for it."""
+        if not self.config.fitting.other_readings:
+            return None
+        other, exchanged = reading.detection.with_sides_exchanged(), None
         if named is not None:
             with watch.step('complete'):
                 exchanged = self._expected(scene, other)
         explains_little = person.estimate is not None and person.estimate.score <= DOUBTFUL_SCORE
         if not (explains_little or is_surer(exchanged, named)):
-            return person
+            return None
         with watch.step('lift'):
             turned = self._read(scene, other, exchanged)
-        if turned.lifted.lifted.sum() < reading.lifted.lifted.sum():
-            return person  # depth contradicts it, and there is less to compare it by
-        again = self._fit_as_read(scene, turned, gravity, watch)
-        return again if self._costs_less(again, person) else person
+        # Joints that depth contradicts are gone: with fewer left, there is less to cost anything.
+        return turned if turned.lifted.lifted.sum() >= reading.lifted.lifted.sum() else None
 
     def _costs_less(self, person: PersonFit, other: PersonFit) -> bool:
         """Return whether a fit explains a person at clearly less cost, each as it read it."""

@@ -38,9 +38,8 @@ class Calibration:
         inflation: Factor of standard deviations by JointState; in the second row of limb joints
             that no keypoint names.
         of_part: Factor of standard deviations of trunk, arms and legs.
-        compression: How far the curvature's standard deviations are drawn toward TYPICAL_M: 0 not
-            at all, 1 to the same for all. Surfaces and priors count as more independent
-            measurements than they are.
+        compression: How far the curvature's standard deviations are drawn toward TYPICAL_M: 1 to
+            the same for all, 0 not at all; below 0 they are spread.
         rival_share: Share of a runner-up that costs no more than the winner.
         rival_cost: Excess cost at which that share has fallen to 1/e.
         retrieved_share: Share of the spread of all started hypotheses: of joints, and of limb
@@ -162,7 +161,7 @@ def covariances(
 def _compressed(
     curvature: Float[np.ndarray, 'n 3 3'], calibration: Calibration
 ) -> Float[np.ndarray, 'n 3 3']:
-    """Return covariances drawn toward the usual size, shapes kept."""
+    """Return covariances drawn toward the usual size or away from it, shapes kept."""
     mean = np.trace(curvature, axis1=1, axis2=2) / 3.0
     factor = (np.maximum(mean, 1e-9) / TYPICAL_M**2) ** -calibration.compression
     return np.asarray(factor[:, None, None] * curvature)
