@@ -19,11 +19,12 @@ from pop_core.fitting.hypotheses import WIDEST_M, Hypothesis, HypothesisSteps, m
 from pop_core.fitting.initialisation import initial_parameters
 from pop_core.fitting.levenberg_marquardt import assemble, cost_of
 from pop_core.fitting.limb_exchange import exchange_limbs
+from pop_core.fitting.limb_points import KINDS
 from pop_core.fitting.limb_proposals import LimbProposals
 from pop_core.fitting.observation import Observation
 from pop_core.fitting.priors import neighbour_sigma_rad
 from pop_core.fitting.readings import best_facing, best_reading
-from pop_core.fitting.trials import Judge
+from pop_core.fitting.trials import Judge, cheapest
 from pop_core.fitting.unclaimed_surface import UnclaimedSurface
 from pop_core.retrieval.candidate import PoseCandidate
 from pop_core.retrieval.pose_prior import PosePrior
@@ -33,6 +34,8 @@ from pop_core.segmentation.body_segmentation import SegmentationConfig
 EARLY_SCALES_M = (WIDEST_M, 0.13, 0.11, 0.09)
 LATE_SCALES_M = (0.08, 0.06, 0.045, 0.035, 0.03)
 SEARCHED_SCALES_M = (0.12, *LATE_SCALES_M)  # a limb that was found is a few centimetres off
+PROMISING = 8.0  # cost beyond the winner's that fitting a limb may save
+SAVED = 1.0  # cost that a fitted limb must save
 TURNED_SCHEDULE = ((EARLY_SCALES_M[-2:], False), (LATE_SCALES_M, True))
 
 
@@ -86,7 +89,8 @@ class BodyFitter:
 
         All candidates are fitted to the joints (step 5), the better ones to the surface (steps 6
         and 7), the best of those, with limbs of the others where they serve better, to the end
-        with the free space (step 8). Limbs that still explain little are looked for anew.
+        with the free space (step 8). Limbs that still explain little are looked for anew,
+        and other ways of the winner's are fitted, too, before they are compared with it.
         """
         unclaimed = UnclaimedSurface(observation)
         started = [self._start(candidate, candidates) for candidate in candidates]
@@ -114,6 +118,7 @@ class BodyFitter:
                 break
             hypotheses, segment = kept, self._compare(kept, observation, unclaimed)
         winner, *others = _best(hypotheses, len(hypotheses))
+        winner = self._with_limbs_fitted(winner, started, observation, segment)
         self._judge(observation, segment)(left_behind)
         runners_up = _runners_up(winner, others, left_behind)
         excess = [other.cost - winner.cost for other in others]
@@ -173,6 +178,26 @@ class BodyFitter:
                 found.append(better)
         judge(found)
         return found
+
+    def _with_limbs_fitted(
+        self, winner: Hypothesis, donors: Sequence[Hypothesis], observation: Observation,
+        segment: Bool[np.ndarray, 'h w'],
+    ) -> Hypothesis:
+        """Return a hypothesis with those other limbs that cost less once they are fitted, too.
+
+        A limb as it was drawn is a few centimetres off and costs for that: beside a fitted one it
+        loses though it is right.
+        """
+        judge = self._judge(observation, segment)
+        for kind in KINDS:
+            trials = self.limbs.trials(winner, kind, donors, observation, segment)
+            judge(trials)
+            promising = [trial for trial in _best(trials, self.config.limb_trials)
+                         if trial.cost < winner.cost + PROMISING]
+            for trial in promising:
+                self.steps.fit_surface(trial, observation, SEARCHED_SCALES_M, free_space=True)
+            winner = cheapest(winner, promising, judge, SAVED)
+        return winner
 
     def _compare(
         self, hypotheses: Sequence[Hypothesis], observation: Observation,

@@ -20,6 +20,9 @@ class FittingConfig:
     limb_searches: int = setting(
         2, minimum=0, maximum=10,
         about='Times that limbs of the finalists are looked for beyond the retrieved poses.')
+    limb_trials: int = setting(
+        2, minimum=0, maximum=10,
+        about='Other ways of each arm and leg that are fitted to compare them with the winner.')
     surface_points: int = setting(
         700, minimum=50, maximum=20000,
         about='Most measured points that pull on the body in one step.')

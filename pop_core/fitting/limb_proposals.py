@@ -40,7 +40,7 @@ class LimbProposals:
     def __init__(self, prior: PosePrior) -> None:
         """Draw the limbs once."""
         poses = prior.sample(np.random.default_rng(SEED), SAMPLES)
-        self._limbs = [_Limbs.of(list(poses), kind) for kind in KINDS]
+        self._limbs = {kind: _Limbs.of(list(poses), kind) for kind in KINDS}
 
     def improve(
         self, hypothesis: Hypothesis, donors: Sequence[Hypothesis], observation: Observation,
@@ -55,16 +55,31 @@ class LimbProposals:
             segment: Pixels of the person.
             judge: Sets the cost of hypotheses.
         """
-        for kind, of_prior in zip(KINDS, self._limbs, strict=True):
-            theirs, present = (
-                _Limbs.of([each.state.parameters.body_pose for each in bodies], kind)
-                for bodies in (donors, [hypothesis]))
-            # The last one is the present limb, which the others have to beat.
-            limbs = _Limbs.joined([theirs, of_prior, present])
-            trials = [_with_limb(hypothesis, kind, limb)
-                      for limb in _competing(hypothesis, kind, limbs, observation, segment)]
+        for kind in KINDS:
+            trials = self.trials(hypothesis, kind, donors, observation, segment)
             hypothesis = cheapest(hypothesis, trials, judge, MARGIN)
         return hypothesis
+
+    def trials(
+        self, hypothesis: Hypothesis, kind: LimbKind, donors: Sequence[Hypothesis],
+        observation: Observation, segment: Bool[np.ndarray, 'h w'],
+    ) -> list[Hypothesis]:
+        """Return a hypothesis with each of the most promising other limbs of a kind.
+
+        Args:
+            hypothesis: What to vary.
+            kind: Which arm or leg.
+            donors: Other hypotheses, whose limbs compete with those of the pose prior.
+            observation: What the sensor says.
+            segment: Pixels of the person.
+        """
+        theirs, present = (
+            _Limbs.of([each.state.parameters.body_pose for each in bodies], kind)
+            for bodies in (donors, [hypothesis]))
+        # The last one is the present limb, which the others have to beat.
+        limbs = _Limbs.joined([theirs, self._limbs[kind], present])
+        return [_with_limb(hypothesis, kind, limb)
+                for limb in _competing(hypothesis, kind, limbs, observation, segment)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

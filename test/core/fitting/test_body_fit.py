@@ -132,7 +132,8 @@ def test_space_that_the_sensor_saw_through_sends_an_arm_behind_the_pillar(
         pose = person.body_pose.copy()
         pose[JOINT_INDEX['left_shoulder'] - 1, 2] = raised_rad
         for free_space in violation:
-            config = FittingConfig(free_space=free_space, limb_searches=0)
+            config = FittingConfig(
+                free_space=free_space, limb_searches=0, limb_trials=0)
             fitter = BodyFitter(body, load_pose_prior(), config)
             found = fit(fitter, hidden, lifted, [person.replaced(body_pose=pose)])
             mesh = render_depth(vertices(body, found.parameters), body.f, CAMERA)
@@ -188,6 +189,25 @@ def test_a_body_costs_by_its_own_reading_of_the_keypoints(
     assert undone == pytest.approx(as_named)
     silent = replace(exchanged, expected=expected)
     assert fitter.costs([body_fit], [silent])[0] < as_exchanged
+
+
+@pytest.mark.parametrize('trials', [0, 2])
+def test_a_limb_that_serves_only_once_it_is_fitted_is_found(
+    body: BodyModel, person: BodyParameters, trials: int
+) -> None:
+    """No keypoint tells of the forearm; as drawn, other ways of it cost more than a wrong one."""
+    bent = person.body_pose.copy()
+    bent[JOINT_INDEX['left_elbow'] - 1, 1] -= 1.2
+    moved = person.replaced(body_pose=bent)
+    lifted = lift_truth(body, moved)
+    lifted = lifted.without(np.arange(len(lifted.scores)) == SHARED_INDEX['left_wrist'])
+    fitter = BodyFitter(
+        body, load_pose_prior(), FittingConfig(limb_searches=0, limb_trials=trials))
+    found = fit(fitter, photograph(body, moved), lifted, [person])
+    wrist = JOINT_INDEX['left_wrist']
+    off_m = np.linalg.norm(
+        joints(body, found.parameters)[wrist] - joints(body, moved)[wrist])
+    assert (off_m < 0.04) == (trials > 0)
 
 
 def test_points_recognised_as_a_far_part_do_not_pull(
