@@ -71,6 +71,7 @@ ABLATIONS: dict[str, dict[str, Value]] = {
     'no free space': {'fitting.free_space': False},
     'no cond. prior': {'fitting.neighbour_weight': 0.0},
     'no completion': {'use_completion': False},
+    'no limb trials': {'fitting.limb_trials': 0},
 }
 
 
